@@ -1,0 +1,24 @@
+// The subcommands of `amrtex`. Each adds itself to the parser; the chosen one runs and
+// returns an exit code (0 ok, 1 the work failed). Exceptions are told in main.cpp.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+namespace amrtex {
+
+using Command = std::function<int()>;
+
+/// Each sets `chosen` when its subcommand was given.
+void add_mesh_commands(CLI::App& app, Command& chosen);     // info, generate, convert
+void add_context_commands(CLI::App& app, Command& chosen);  // encodings, doctor
+void add_sample_command(CLI::App& app, Command& chosen);
+void add_render_command(CLI::App& app, Command& chosen);
+void add_run_commands(CLI::App& app, Command& chosen);      // run, report
+
+/// "512MiB", "2GiB", "1000000". Throws UsageError.
+std::int64_t parse_bytes(const std::string& text);
+
+}  // namespace amrtex

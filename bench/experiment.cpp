@@ -1,0 +1,572 @@
+#include "bench/experiment.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <functional>
+#include <limits>
+#include <set>
+
+#include "bench/json_file.hpp"
+#include "structures/error.hpp"
+
+namespace amrtex {
+namespace {
+
+using Names = std::vector<std::string_view>;
+/// One value for each key of an object whose values may be axes.
+using Choice = std::vector<std::pair<std::string, JsonNode>>;
+
+constexpr int kMaxPictureEdge = 16384;
+constexpr int kMaxFrames = 1000000;
+
+constexpr std::array<std::string_view, 9> kAvailableRenderKeys = {"mode", "sampling",  "step",     "width",     "height",
+                                                                  "skip", "early_end", "consumer", "integrator"};
+constexpr std::array<std::string_view, 5> kLaterRenderKeys = {"tolerance", "prune", "level_of_detail", "isovalues",
+                                                              "clip_planes"};
+constexpr std::array<std::string_view, 1> kConsumers = {"raycast"};
+constexpr std::array<std::string_view, 1> kIntegrators = {"exponential_midpoint"};
+constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
+
+/// How many lists deep one value of this key is; what lies deeper is an axis.
+int value_depth(std::string_view key) {
+  if (key == "extinction" || key == "color") return 2;
+  constexpr std::array<std::string_view, 8> lists = {"eye",         "at",   "up",    "isovalues",
+                                                     "clip_planes", "root", "ratio", "skip_levels"};
+  return std::find(lists.begin(), lists.end(), key) != lists.end() ? 1 : 0;
+}
+
+int list_depth(const Json& json) { return !json.is_array() ? 0 : 1 + (json.empty() ? 0 : list_depth(json.front())); }
+
+bool is_axis(std::string_view key, const Json& json) { return list_depth(json) > value_depth(key); }
+
+/// Runs a parser of another part of the program and adds file, line and key to its complaint.
+template <class F>
+auto located(const JsonNode& node, F&& parse) {
+  try {
+    return parse();
+  } catch (const Error& e) {
+    node.fail(e.what());
+  }
+}
+
+Json to_object(const Choice& choice) {
+  Json object = Json::object();
+  for (const auto& [key, node] : choice) object[key] = node.json();
+  return object;
+}
+
+const JsonNode* find(const Choice& choice, std::string_view key) {
+  for (const auto& [name, node] : choice)
+    if (name == key) return &node;
+  return nullptr;
+}
+
+/// Drops elements whose text was there before, and keeps the order.
+template <class T>
+void remove_repeated(std::vector<T>& list, const std::function<std::string(const T&)>& text) {
+  std::set<std::string> seen;
+  std::erase_if(list, [&](const T& item) { return !seen.insert(text(item)).second; });
+}
+
+/// `render_json` without names: a new name is no new measurement.
+Json unnamed_render_json(const RenderPoint& render) {
+  Json json = render_json(render);
+  json.erase("view_name");
+  json.erase("transfer_function_name");
+  return json;
+}
+
+class Parser {
+ public:
+  Parser(const JsonFile& file, bool scene) : file_(file), root_(file.root()), scene_(scene) { experiment_.file = file.path(); }
+
+  Experiment parse() {
+    accept_root_keys();
+    parse_name();
+    parse_datasets();
+    parse_builds();
+    parse_renders();
+    parse_reference();
+    parse_measuring();
+    if (scene_) require_one_point();
+    return std::move(experiment_);
+  }
+
+ private:
+  void accept_root_keys() const {
+    Names keys = {"name",      "datasets", "encodings",         "filters", "storage", "filtering",
+                  "render",    "views",    "transfer_function", "frames",  "warm_up", "seed",
+                  "reference", "context",  "memory_limit",      "check",   "baseline"};
+    if (scene_) keys.push_back("region");
+    root_.accept_keys(keys);
+  }
+
+  /// The values of an axis, or the one value; remembers where axes are.
+  std::vector<JsonNode> values(std::string_view key, const JsonNode& node) {
+    if (!is_axis(key, node.json())) return {node};
+    const std::vector<JsonNode> items = node.items();
+    if (items.size() > 1) experiment_.axes.push_back(node.place());
+    return items;
+  }
+
+  std::vector<JsonNode> values(std::string_view key) {
+    const auto node = root_.find(key);
+    return node ? values(key, *node) : std::vector<JsonNode>();
+  }
+
+  /// All combinations of the axes among the members; the last one varies fastest.
+  std::vector<Choice> combinations(const JsonNode& object) {
+    std::vector<Choice> all = {{}};
+    for (const auto& [key, node] : object.members()) {
+      std::vector<Choice> next;
+      const std::vector<JsonNode> items = values(key, node);
+      for (const Choice& choice : all)
+        for (const JsonNode& item : items) {
+          next.push_back(choice);
+          next.back().emplace_back(key, item);
+        }
+      all = std::move(next);
+    }
+    return all;
+  }
+
+  void parse_name() {
+    const auto name = root_.find("name");
+    if (!name && !scene_) root_.require("name");
+    experiment_.name = name ? name->text() : file_.path().stem().string();
+    if (experiment_.name.empty()) name->fail("an empty name");
+  }
+
+  // --- data sets ---
+
+  void parse_datasets() {
+    root_.require("datasets");
+    for (const JsonNode& node : values("datasets")) {
+      node.accept_keys(Names{"name", "file", "field", "generate"});
+      const auto generate = node.find("generate");
+      if (node.find("file").has_value() == generate.has_value()) node.fail("one of the keys 'file' and 'generate' is needed");
+      if (generate)
+        parse_generated(node, *generate);
+      else
+        parse_files(node);
+    }
+  }
+
+  void parse_generated(const JsonNode& node, const JsonNode& generate) {
+    if (const auto field = node.find("field")) field->fail("a generated data set has one field; its name goes into 'generate'");
+    for (const JsonNode& specification : generate.items())
+      for (const Choice& choice : combinations(specification)) {
+        DatasetSource source;
+        source.generate = to_object(choice);
+        const auto name = node.find("name");
+        source.name = (name ? name->text() : field_name(source.generate)) + axis_values(specification, choice);
+        experiment_.datasets.push_back(std::move(source));
+      }
+  }
+
+  /// The values of one point along the axes of a specification: " levels=4 seed=2".
+  static std::string axis_values(const JsonNode& specification, const Choice& choice) {
+    std::string text;
+    for (const auto& [key, node] : choice)
+      if (key != "field" && is_axis(key, specification.find(key)->json())) text += fmt::format(" {}={}", key, node.json().dump());
+    return text;
+  }
+
+  /// A field is written as its type, or as an object that holds its type.
+  static std::string field_name(const Json& specification) {
+    if (specification.contains("name") && specification["name"].is_string()) return specification["name"].get<std::string>();
+    const Json field = specification.value("field", Json());
+    const Json type = field.is_object() ? field.value("type", Json()) : field;
+    return type.is_string() ? type.get<std::string>() : "generated";
+  }
+
+  void parse_files(const JsonNode& node) {
+    for (const Choice& choice : combinations(node)) {
+      DatasetSource source;
+      const JsonNode& file = *find(choice, "file");
+      source.file = existing_path(file);
+      if (const JsonNode* field = find(choice, "field"); field != nullptr && !field->json().is_null())
+        source.field = field->text();
+      const JsonNode* name = find(choice, "name");
+      source.name = name != nullptr ? name->text() : file_name(*source.file);
+      experiment_.datasets.push_back(std::move(source));
+    }
+  }
+
+  static std::string file_name(const std::filesystem::path& path) {
+    const auto name = path.filename();
+    return (name.empty() ? path.parent_path().filename() : name).string();  // a folder may end in a slash
+  }
+
+  std::filesystem::path existing_path(const JsonNode& node) const {
+    const std::filesystem::path given = node.text();
+    const std::filesystem::path beside = file_.path().parent_path() / given;  // `given` where that is absolute
+    std::error_code ignored;
+    if (!given.empty() && std::filesystem::exists(beside, ignored)) return beside;
+    if (!given.empty() && std::filesystem::exists(given, ignored)) return given;
+    node.fail(given.is_absolute() ? fmt::format("no such file or folder: {}", given.string())
+                                  : fmt::format("no such file or folder: neither {} nor {}", beside.string(),
+                                                (std::filesystem::current_path(ignored) / given).string()));
+  }
+
+  // --- builds ---
+
+  void parse_builds() {
+    root_.require("encodings");
+    const auto filters = parsed_values<Filter>("filters", Filter::nearest, parse_filter);
+    const auto storages = parsed_values<Storage>("storage", Storage::r32f, parse_storage);
+    const auto filterings = parsed_values<Filtering>("filtering", Filtering::hardware, parse_filtering);
+    const std::vector<BuildPoint> encodings = parse_encodings();
+    for (std::size_t dataset = 0; dataset < experiment_.datasets.size(); ++dataset)
+      for (BuildPoint build : encodings)
+        for (const Filter filter : filters)
+          for (const Storage storage : storages)
+            for (const Filtering filtering : filterings) {
+              build.dataset = dataset;
+              build.filter = filter;
+              build.storage = storage;
+              build.filtering = filter == Filter::nearest ? Filtering::manual : filtering;
+              experiment_.builds.push_back(build);
+            }
+    remove_repeated<BuildPoint>(experiment_.builds, [](const BuildPoint& b) {
+      return fmt::format("{} {} {} {} {} {}", b.dataset, b.encoding, b.parameters.dump(), filter_name(b.filter),
+                         format_name(b.storage), filtering_name(b.filtering));
+    });
+  }
+
+  template <class T>
+  std::vector<T> parsed_values(std::string_view key, T otherwise, T (*from_name)(std::string_view)) {
+    std::vector<T> parsed;
+    for (const JsonNode& node : values(key)) parsed.push_back(located(node, [&] { return from_name(node.text()); }));
+    if (parsed.empty()) parsed.push_back(otherwise);
+    return parsed;
+  }
+
+  std::vector<BuildPoint> parse_encodings() {
+    std::vector<BuildPoint> builds;
+    for (const JsonNode& node : values("encodings")) {
+      node.members();
+      node.require("name");
+      for (const Choice& choice : combinations(node)) builds.push_back(parse_encoding(node, choice));
+    }
+    return builds;
+  }
+
+  static BuildPoint parse_encoding(const JsonNode& node, const Choice& choice) {
+    BuildPoint build;
+    const JsonNode& name = *find(choice, "name");
+    build.encoding = name.text();
+    const Encoding* encoding = located(name, [&] { return &find_encoding(build.encoding); });
+    accept_parameters(*encoding, choice);
+    Json given = to_object(choice);
+    given.erase("name");
+    build.parameters = located(node, [&] { return complete_parameters(*encoding, given); });
+    return build;
+  }
+
+  /// Here rather than in complete_parameters alone, for the line of the key.
+  static void accept_parameters(const Encoding& encoding, const Choice& choice) {
+    const std::vector<ParameterInfo> parameters = encoding.parameters();
+    Names known = {"name"};
+    for (const ParameterInfo& p : parameters) known.push_back(p.name);
+    for (const auto& [key, node] : choice)
+      if (std::find(known.begin(), known.end(), key) == known.end())
+        node.fail(fmt::format("encoding {} has no such parameter; accepted: {}{}", encoding.name(), fmt::join(known, ", "),
+                              suggestion(key, known)));
+  }
+
+  // --- render points ---
+
+  void parse_renders() {
+    const std::vector<RenderPoint> settings = parse_settings();
+    const std::vector<RenderPoint> views = parse_views();
+    const std::vector<RenderPoint> functions = parse_transfer_functions();
+    for (const RenderPoint& view : views)
+      for (const RenderPoint& function : functions)
+        for (RenderPoint render : settings) {
+          render.view = view.view;
+          render.view_name = view.view_name;
+          if (render.settings.mode == Mode::dvr) {
+            render.transfer_function = function.transfer_function;
+            render.transfer_function_name = function.transfer_function_name;
+          }
+          add_measured(render);
+        }
+    remove_repeated<RenderPoint>(experiment_.renders, [](const RenderPoint& r) {
+      return fmt::format("{} {} {}", unnamed_render_json(r).dump(), r.frames, r.warm_up);
+    });
+  }
+
+  void add_measured(RenderPoint render) {
+    for (const int frames : counts("frames", 1, render.frames))
+      for (const int warm_up : counts("warm_up", 0, render.warm_up)) {
+        render.frames = frames;
+        render.warm_up = warm_up;
+        experiment_.renders.push_back(render);
+      }
+  }
+
+  std::vector<int> counts(std::string_view key, int least, int otherwise) const {
+    const auto node = root_.find(key);
+    if (!node) return {otherwise};
+    std::vector<int> counts;
+    for (const JsonNode& item : node->items()) counts.push_back(static_cast<int>(item.integer(least, kMaxFrames)));
+    return counts;
+  }
+
+  std::vector<RenderPoint> parse_settings() {
+    const auto node = root_.find("render");
+    if (!node) return {RenderPoint{}};
+    std::vector<RenderPoint> points;
+    for (const JsonNode& render : node->items()) {
+      for (const auto& [key, value] : render.members()) refuse_later(key, value);
+      render.accept_keys(kAvailableRenderKeys);
+      for (const Choice& choice : combinations(render)) points.push_back(parse_setting(choice));
+    }
+    return points;
+  }
+
+  static void refuse_later(const std::string& key, const JsonNode& node) {
+    if (std::find(kLaterRenderKeys.begin(), kLaterRenderKeys.end(), key) != kLaterRenderKeys.end())
+      node.fail(fmt::format("not available in this version; available: {}", fmt::join(kAvailableRenderKeys, ", ")));
+  }
+
+  static RenderPoint parse_setting(const Choice& choice) {
+    RenderPoint point;
+    for (const auto& [key, node] : choice) set(point, key, node);
+    if (point.settings.mode != Mode::dvr) point.settings.early_end.reset();  // no opacity to end at
+    return point;
+  }
+
+  static void set(RenderPoint& point, const std::string& key, const JsonNode& node) {
+    RenderSettings& s = point.settings;
+    if (key == "mode") s.mode = located(node, [&] { return parse_mode(node.text()); });
+    if (key == "sampling") s.sampling = located(node, [&] { return parse_sampling(node.text()); });
+    if (key == "step") s.step = node.positive_number();
+    if (key == "width") s.width = static_cast<int>(node.integer(1, kMaxPictureEdge));
+    if (key == "height") s.height = static_cast<int>(node.integer(1, kMaxPictureEdge));
+    if (key == "skip") s.skip = node.boolean();
+    if (key == "early_end" && !node.json().is_null()) s.early_end = node.number(0, 1);
+    if (key == "consumer") point.consumer = node.one_of(kConsumers);
+    if (key == "integrator") point.integrator = node.one_of(kIntegrators);
+  }
+
+  /// Where the parser of views or transfer functions complains about a combination.
+  static JsonNode culprit(const JsonNode& object, const std::string& message) {
+    for (const auto& [key, node] : object.members())
+      if (message.find("'" + key + "'") != std::string::npos) return node;
+    return object;
+  }
+
+  /// Calls use(object without its name, name) for every combination of an object's axes;
+  /// names that stand for several combinations get a number.
+  template <class F>
+  void for_each_named(const JsonNode& object, const std::string& otherwise, F&& use) {
+    const std::vector<Choice> choices = combinations(object);
+    for (std::size_t i = 0; i < choices.size(); ++i) {
+      Json json = to_object(choices[i]);
+      json.erase("name");
+      const JsonNode* given = find(choices[i], "name");
+      std::string name = given != nullptr ? given->text() : otherwise;
+      if (choices.size() > 1) name += fmt::format(".{}", i + 1);
+      try {
+        use(json, name);
+      } catch (const Error& e) {
+        culprit(object, e.what()).fail(e.what());
+      }
+    }
+  }
+
+  std::vector<RenderPoint> parse_views() {
+    root_.require("views");
+    std::vector<RenderPoint> points;
+    const std::vector<JsonNode> nodes = values("views");
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+      for_each_named(nodes[i], fmt::format("view {}", i + 1), [&](const Json& json, const std::string& name) {
+        RenderPoint point;
+        point.view = parse_view(json);
+        camera_frame(point.view, 1, 1);  // throws where the view is degenerate
+        point.view_name = name;
+        points.push_back(point);
+      });
+    return points;
+  }
+
+  std::vector<RenderPoint> parse_transfer_functions() {
+    if (!root_.find("transfer_function")) {
+      require_no_transfer_function();
+      return {RenderPoint{}};
+    }
+    std::vector<RenderPoint> points;
+    const std::vector<JsonNode> nodes = values("transfer_function");
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+      for_each_named(nodes[i], fmt::format("transfer function {}", i + 1), [&](const Json& json, const std::string& name) {
+        RenderPoint point;
+        point.transfer_function = parse_transfer_function(json);
+        validate(point.transfer_function);
+        point.transfer_function_name = name;
+        points.push_back(point);
+      });
+    return points;
+  }
+
+  void require_no_transfer_function() {
+    for (const RenderPoint& point : parse_settings())
+      if (point.settings.mode == Mode::dvr)
+        root_.fail(
+            "the key 'transfer_function' is missing: mode dvr needs {\"extinction\": [[value, extinction], ...], "
+            "\"color\": [[value, r, g, b], ...]}");
+  }
+
+  // --- the rest ---
+
+  void parse_reference() {
+    const auto node = root_.find("reference");
+    if (!node) return;
+    if (node->json().is_null()) {
+      experiment_.reference.reset();
+      return;
+    }
+    node->accept_keys(Names{"step", "filter"});
+    if (const auto step = node->find("step")) experiment_.reference->step = step->positive_number();
+    if (const auto filter = node->find("filter")) experiment_.reference->common_filter = parse_common_filter(*filter);
+  }
+
+  static std::optional<Filter> parse_common_filter(const JsonNode& node) {
+    Names accepted = {"own"};
+    for (const Filter filter : all_filters()) accepted.push_back(filter_name(filter));
+    const std::string name = node.one_of(accepted);
+    if (name == "own") return std::nullopt;
+    return parse_filter(name);
+  }
+
+  void parse_measuring() {
+    if (const auto seed = root_.find("seed")) experiment_.seed = static_cast<std::uint64_t>(seed->integer(0, INT64_MAX));
+    if (const auto context = root_.find("context")) experiment_.context = context->one_of(kContexts);
+    if (const auto limit = root_.find("memory_limit"); limit && !limit->json().is_null())
+      experiment_.memory_limit = limit->integer(1, INT64_MAX);
+    if (const auto check = root_.find("check"); check && !check->json().is_null()) {
+      check->accept_keys(Names{"psnr_db"});
+      experiment_.minimum_psnr_db = check->require("psnr_db").number(0, 1000);
+    }
+    if (const auto baseline = root_.find("baseline")) experiment_.baseline = baseline->boolean();
+    if (const auto region = root_.find("region")) parse_region(*region);
+  }
+
+  /// {"lower": [x, y, z], "upper": [x, y, z]}, or the two corners as a list.
+  void parse_region(const JsonNode& node) {
+    std::array<Vec3d, 2> region;
+    if (node.json().is_object()) {
+      node.accept_keys(Names{"lower", "upper"});
+      region = {parse_corner(node.require("lower")), parse_corner(node.require("upper"))};
+    } else {
+      const std::vector<JsonNode> corners = node.items();
+      if (corners.size() != 2) node.fail("{\"lower\": [x, y, z], \"upper\": [x, y, z]} is expected, in world units");
+      region = {parse_corner(corners[0]), parse_corner(corners[1])};
+    }
+    for (int axis = 0; axis < 3; ++axis)
+      if (!(region[0][axis] < region[1][axis])) node.fail("the lower corner must lie below the upper one along every axis");
+    experiment_.region = region;
+  }
+
+  static Vec3d parse_corner(const JsonNode& node) {
+    const std::vector<JsonNode> items = node.items();
+    if (items.size() != 3) node.fail("three numbers [x, y, z] are expected, in world units");
+    constexpr double kLargest = std::numeric_limits<double>::max();
+    return {items[0].number(-kLargest, kLargest), items[1].number(-kLargest, kLargest), items[2].number(-kLargest, kLargest)};
+  }
+
+  void require_one_point() const {
+    if (experiment_.points() == 1) return;
+    root_.fail(fmt::format("a scene file describes one picture, this one {}; lists with several values: {}", experiment_.points(),
+                           fmt::join(experiment_.axes, ", ")));
+  }
+
+  const JsonFile& file_;
+  JsonNode root_;
+  bool scene_;
+  Experiment experiment_;
+};
+
+Json json_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+
+}  // namespace
+
+Experiment parse_experiment(std::string text, const std::filesystem::path& path) {
+  const JsonFile file(std::move(text), path);
+  return Parser(file, false).parse();
+}
+
+Experiment read_experiment(const std::filesystem::path& path) {
+  const JsonFile file = JsonFile::read(path);
+  return Parser(file, false).parse();
+}
+
+Experiment parse_scene(std::string text, const std::filesystem::path& path) {
+  const JsonFile file(std::move(text), path);
+  return Parser(file, true).parse();
+}
+
+Experiment read_scene(const std::filesystem::path& path) {
+  const JsonFile file = JsonFile::read(path);
+  return Parser(file, true).parse();
+}
+
+Scene scene_of(const Experiment& experiment, const RenderPoint& render) {
+  return Scene{render.view, render.transfer_function, render.settings, experiment.region};
+}
+
+Json render_json(const RenderPoint& render) {
+  const RenderSettings& s = render.settings;
+  Json json = {{"consumer", render.consumer},
+               {"mode", mode_name(s.mode)},
+               {"sampling", sampling_name(s.sampling)},
+               {"step", s.step},
+               {"integrator", render.integrator},
+               {"width", s.width},
+               {"height", s.height},
+               {"skip", s.skip},
+               {"early_end", json_or_null(s.early_end)},
+               {"view", to_json(render.view)},
+               {"view_name", render.view_name},
+               {"transfer_function", nullptr},
+               {"transfer_function_name", nullptr}};
+  if (!render.transfer_function_name.empty()) {
+    json["transfer_function"] = to_json(render.transfer_function);
+    json["transfer_function_name"] = render.transfer_function_name;
+  }
+  return json;
+}
+
+Json point_configuration(const Experiment& experiment, const BuildPoint& build, const RenderPoint& render,
+                         std::string_view dataset_hash) {
+  Json region, reference;
+  if (experiment.region)
+    for (const Vec3d& corner : *experiment.region) region.push_back({corner.x, corner.y, corner.z});
+  if (experiment.reference) {
+    const auto& common = experiment.reference->common_filter;
+    reference = {{"step", experiment.reference->step}, {"filter", common ? filter_name(*common) : "own"}};
+  }
+  return {{"experiment", experiment.name},
+          {"dataset", dataset_hash},
+          {"encoding", build.encoding},
+          {"build_parameters", build.parameters},
+          {"filter", filter_name(build.filter)},
+          {"storage", format_name(build.storage)},
+          {"filtering", filtering_name(build.filtering)},
+          {"render", unnamed_render_json(render)},
+          {"region", region},
+          {"frames", render.frames},
+          {"warm_up", render.warm_up},
+          {"seed", experiment.seed},
+          {"reference", reference},
+          {"baseline", experiment.baseline},
+          {"context", experiment.context},
+          {"memory_limit", experiment.memory_limit ? Json(*experiment.memory_limit) : Json()},
+          {"minimum_psnr_db", json_or_null(experiment.minimum_psnr_db)}};
+}
+
+}  // namespace amrtex

@@ -1,0 +1,374 @@
+#include "bench/runner.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <map>
+#include <memory>
+
+#include "bench/environment.hpp"
+#include "bench/image_error.hpp"
+#include "bench/record.hpp"
+#include "bench/statistics.hpp"
+#include "renderers/hierarchy_reference.hpp"
+#include "structures/mesh_io.hpp"
+#include "structures/synthetic.hpp"
+
+namespace amrtex {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Two readings of the baseline that differ by more say that the machine was busy.
+constexpr double kBaselineDrift = 0.15;
+constexpr int kBaselineFrames = 3;
+constexpr int kTimingTries = 4;
+
+class Stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// A structure on the context, with what was measured on the way there.
+struct Built {
+  EncodedField field;
+  std::unique_ptr<GpuField> gpu;
+  double build_seconds = 0;
+  double upload_seconds = 0;
+};
+
+struct Failure {
+  Status status;
+  std::string reason;
+};
+
+/// Why a point could not be measured, from the exception that says so.
+Failure failure_of(const std::exception& error) {
+  if (dynamic_cast<const UnsupportedError*>(&error) != nullptr) return {Status::unsupported, error.what()};
+  if (dynamic_cast<const BudgetError*>(&error) != nullptr) return {Status::over_budget, error.what()};
+  return {Status::failed, error.what()};
+}
+
+class Runner {
+ public:
+  Runner(const Experiment& experiment, const RunOptions& options)
+      : experiment_(experiment),
+        options_(options),
+        context_(make_context(parse_context_kind(experiment.context))) {}
+
+  RunSummary run() {
+    for (const BuildPoint& build : experiment_.builds) run_build(build);
+    return summary_;
+  }
+
+ private:
+  void load(std::size_t dataset) {
+    if (mesh_ && loaded_ == dataset) return;
+    baseline_.reset();
+    baseline_caster_.reset();
+    mesh_.emplace(load_dataset(experiment_.datasets[dataset]));
+    loaded_ = dataset;
+    const auto& name = experiment_.datasets[dataset].field;
+    field_ = name ? mesh_->field_index(*name) : 0;
+    mesh_hash_ = mesh_->content_hash(field_);
+  }
+
+  std::string hash_of(const BuildPoint& build, const RenderPoint& render) const {
+    return configuration_hash(point_configuration(experiment_, build, render, mesh_hash_));
+  }
+
+  void run_build(const BuildPoint& build) {
+    load(build.dataset);
+    std::vector<const RenderPoint*> open;
+    for (const RenderPoint& render : experiment_.renders) {
+      if (!options_.force && has_record(options_.folder, hash_of(build, render)))
+        ++summary_.kept;
+      else
+        open.push_back(&render);
+    }
+    if (open.empty()) return;
+    std::unique_ptr<Built> built;
+    try {
+      built = make(build);
+    } catch (const UsageError&) {
+      throw;  // a bad parameter concerns the whole experiment
+    } catch (const std::exception& error) {
+      for (const RenderPoint* render : open) record_failure(build, *render, failure_of(error));
+      return;
+    }
+    for (const RenderPoint* render : open) {
+      options_.progress(fmt::format("{} {} {} {}", build.encoding, build.parameters.dump(), filter_name(build.filter),
+                                    render_json(*render).dump()));
+      try {
+        measure(build, *built, *render);
+      } catch (const UsageError&) {
+        throw;
+      } catch (const std::exception& error) {
+        record_failure(build, *render, failure_of(error));
+      }
+    }
+  }
+
+  std::unique_ptr<Built> make(const BuildPoint& build) {
+    BuildRequest request;
+    request.field = field_;
+    request.storage = build.storage;
+    request.parameters = build.parameters;
+    request.context = context_->info();
+    request.memory_limit = experiment_.memory_limit.value_or(request.memory_limit);
+    request.needs.filter = build.filter;
+    request.needs.filtering = build.filtering;
+    request.needs.value_ranges = false;
+    for (const RenderPoint& render : experiment_.renders)
+      request.needs.value_ranges = request.needs.value_ranges || render.settings.skip;
+    const Encoding& encoding = find_encoding(build.encoding);
+    if (const Support support = encoding.supported(request.context); !support.ok)
+      throw UnsupportedError(fmt::format("encoding {}: {}", build.encoding, support.reason));
+    auto built = std::make_unique<Built>();
+    const Stopwatch building;
+    built->field = encoding.build(*mesh_, request);
+    built->build_seconds = building.seconds();
+    const Stopwatch uploading;
+    built->gpu = std::make_unique<GpuField>(built->field, *context_);
+    context_->gl().Finish();
+    built->upload_seconds = uploading.seconds();
+    return built;
+  }
+
+  void measure(const BuildPoint& build, Built& built, const RenderPoint& render) {
+    const Scene scene = scene_of(experiment_, render);
+    const Stopwatch first;
+    Raycaster raycaster(*context_, *mesh_, built.field, *built.gpu, scene);
+    raycaster.draw();
+    const double first_frame_ms = first.seconds() * 1000;
+    const Picture picture = raycaster.read();
+
+    Json record = blank_record(Status::ok);
+    describe(record, build, render, &built);
+    record["first_frame_ms"] = first_frame_ms;
+    record["image_hash"] = picture_hash(picture);
+    record["context"]["shader_hash"] = raycaster.shader_hash();
+    if (!raycaster.transfer_exact())
+      warn(record, "the transfer function's points are not evenly spaced: it is drawn from a table of 4096 bins");
+    if (!add_errors(record, picture, built.field, scene)) {
+      write(build, render, record);
+      return;  // a wrong picture gets no time
+    }
+    write_png(picture, picture_path(build, render));
+    const WorkCounts work = raycaster.count();
+    record["work"] = {
+        {"rays", work.rays}, {"samples", work.samples}, {"regions", work.regions}, {"regions_skipped", work.regions_skipped}};
+    if (render.frames > 0) add_times(record, build, render, raycaster);
+    write(build, render, record);
+  }
+
+  static void warn(Json& record, const std::string& text) { record["context"]["warnings"].push_back(text); }
+
+  /// False when the picture is wrong.
+  bool add_errors(Json& record, const Picture& picture, const EncodedField& field, const Scene& scene) {
+    if (!experiment_.reference) return true;
+    const ReferenceSettings& reference = *experiment_.reference;
+    const fs::path cache = options_.folder / "references";
+    std::string hash;
+    const Picture own = cached_reference(*mesh_, field.definition, scene, reference.step, cache, hash);
+    const ErrorMetrics error = compare(picture, own);
+    record["error"] = error_json(error, hash);
+    if (reference.common_filter) {
+      FilterDefinition common{*reference.common_filter, 0, mesh_->finest_level()};
+      if (common.filter != Filter::linear_page) common.page_level = 0;
+      const Picture shared = cached_reference(*mesh_, common, scene, reference.step, cache, hash);
+      record["error_common"] = error_json(compare(picture, shared), hash);
+      record["error_common"]["filter"] = filter_name(common.filter);
+    }
+    if (experiment_.minimum_psnr_db && !reaches_psnr(error, *experiment_.minimum_psnr_db)) {
+      record["status"] = status_name(Status::failed);
+      record["reason"] = fmt::format("failed check: psnr_db {:.2f} against its own reference, at least {} is asked for",
+                                     error.psnr_db.value_or(0), *experiment_.minimum_psnr_db);
+      return false;
+    }
+    return true;
+  }
+
+  void add_times(Json& record, const BuildPoint& build, const RenderPoint& render, Raycaster& raycaster) {
+    std::vector<FrameTime> frames;
+    double before = 0;
+    double after = 0;
+    Raycaster* baseline = baseline_for(build, render);
+    for (int tries = 0; tries < kTimingTries; ++tries) {
+      before = baseline_ms(baseline);
+      frames = time_frames(raycaster, render.warm_up, render.frames);
+      after = baseline_ms(baseline);
+      if (baseline == nullptr || std::abs(after - before) <= kBaselineDrift * std::min(before, after)) break;
+    }
+    std::vector<double> wall;
+    std::vector<double> gpu;
+    for (const FrameTime& f : frames) {
+      wall.push_back(f.wall_ms);
+      gpu.push_back(f.gpu_ms);
+    }
+    Json frame;
+    frame["wall_ms"] = timing_json(wall);
+    frame["gpu_ms"] = timing_json(gpu);
+    frame["all_wall_ms"] = wall;
+    frame["warm_up"] = render.warm_up;
+    frame["baseline_ms"] = nullptr;
+    frame["relative"] = nullptr;
+    if (baseline != nullptr) {
+      frame["baseline_ms"] = {before, after};
+      frame["relative"] = median(wall) / ((before + after) / 2);
+      if (std::abs(after - before) > kBaselineDrift * std::min(before, after))
+        warn(record, fmt::format("the baseline took {:.1f} ms before and {:.1f} ms after: other work disturbed this time", before,
+                                 after));
+    }
+    record["frame"] = frame;
+  }
+
+  double baseline_ms(Raycaster* baseline) {
+    if (baseline == nullptr) return 0;
+    std::vector<double> wall;
+    for (const FrameTime& f : time_frames(*baseline, 1, kBaselineFrames)) wall.push_back(f.wall_ms);
+    return median(wall);
+  }
+
+  /// The experiment's first build with its first render settings, for the same view, when it asks for one.
+  Raycaster* baseline_for(const BuildPoint& build, const RenderPoint& render) {
+    if (!experiment_.baseline) return nullptr;
+    const BuildPoint* first = nullptr;
+    for (const BuildPoint& b : experiment_.builds)
+      if (b.dataset == build.dataset && first == nullptr) first = &b;
+    RenderPoint settings = experiment_.renders.front();
+    settings.view = render.view;
+    settings.view_name = render.view_name;
+    settings.transfer_function = render.transfer_function;
+    settings.transfer_function_name = render.transfer_function_name;
+    const std::string key = render_json(settings).dump();
+    if (!baseline_) baseline_ = make(*first);
+    if (!baseline_caster_ || key != baseline_key_) {
+      baseline_caster_ =
+          std::make_unique<Raycaster>(*context_, *mesh_, baseline_->field, *baseline_->gpu, scene_of(experiment_, settings));
+      baseline_key_ = key;
+    }
+    return baseline_caster_.get();
+  }
+
+  void describe(Json& record, const BuildPoint& build, const RenderPoint& render, const Built* built) {
+    const DatasetSource& source = experiment_.datasets[build.dataset];
+    std::int64_t patches = 0;
+    for (int l = 0; l < mesh_->level_count(); ++l) patches += static_cast<std::int64_t>(mesh_->patches(l).size());
+    record["experiment"] = experiment_.name;
+    record["dataset"] = {{"name", source.name},
+                         {"hash", mesh_hash_},
+                         {"leaf_cells", mesh_->leaf_cells()},
+                         {"stored_cells", mesh_->stored_cells()},
+                         {"levels", mesh_->level_count()},
+                         {"patches", patches},
+                         {"field", mesh_->fields()[static_cast<std::size_t>(field_)]}};
+    record["encoding"] = build.encoding;
+    record["build_parameters"] = built != nullptr ? built->field.build_parameters : build.parameters;
+    record["filter"] = filter_name(build.filter);
+    record["storage"] = format_name(build.storage);
+    record["filtering"] = filtering_name(build.filtering);
+    record["render"] = render_json(render);
+    record["context"] = context_json();
+    record["context"]["renderer"] = context_->info().renderer;
+    record["context"]["gl_version"] = context_->info().version;
+    record["context"]["software"] = context_->info().software;
+    record["context"]["extensions_missing"] = Json::array();
+    for (const char* name : {"GL_ARB_bindless_texture", "GL_ARB_shader_ballot"})
+      if (!context_->info().has_extension(name)) record["context"]["extensions_missing"].push_back(name);
+    record["context"]["warnings"] = Json::array();
+    if (built == nullptr) return;
+    record["memory"] = memory_json(built->field, mesh_->leaf_cells());
+    record["build_seconds"] = built->build_seconds;
+    record["upload_seconds"] = built->upload_seconds;
+    record["left_out"] = left_out_json(built->field);
+    record["statistics"] = built->field.statistics;
+    record["storage_scale"] = {{"a", built->field.scale.offset}, {"b", built->field.scale.scale}};
+  }
+
+  void record_failure(const BuildPoint& build, const RenderPoint& render, const Failure& failure) {
+    Json record = blank_record(failure.status, failure.reason);
+    describe(record, build, render, nullptr);
+    write(build, render, record);
+  }
+
+  void write(const BuildPoint& build, const RenderPoint& render, const Json& record) {
+    write_record(options_.folder, hash_of(build, render), record, options_.force);
+    const std::string status = record.at("status");
+    if (status == "ok")
+      ++summary_.measured;
+    else if (status == "unsupported")
+      ++summary_.unsupported;
+    else if (status == "over_budget")
+      ++summary_.over_budget;
+    else
+      ++summary_.failed;
+  }
+
+  fs::path picture_path(const BuildPoint& build, const RenderPoint& render) const {
+    fs::create_directories(options_.folder / "pictures");
+    return options_.folder / "pictures" / (hash_of(build, render) + ".png");
+  }
+
+  const Experiment& experiment_;
+  const RunOptions& options_;
+  std::unique_ptr<Context> context_;
+  RunSummary summary_;
+  std::optional<AmrHierarchy> mesh_;
+  std::size_t loaded_ = 0;
+  int field_ = 0;
+  std::string mesh_hash_;
+  std::unique_ptr<Built> baseline_;
+  std::unique_ptr<Raycaster> baseline_caster_;
+  std::string baseline_key_;
+};
+
+}  // namespace
+
+AmrHierarchy load_dataset(const DatasetSource& source) {
+  AmrHierarchy mesh(source.file ? read_mesh(*source.file, source.field) : generate_mesh(source.generate));
+  if (source.field) mesh.field_index(*source.field);
+  return mesh;
+}
+
+Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definition, const Scene& scene, double step,
+                         const fs::path& folder, std::string& hash) {
+  // no sampling settings: the reference is independent of them
+  Json key;
+  key["mesh"] = hierarchy.content_hash(0);
+  const Vec3d lower = hierarchy.domain_lower();
+  const Vec3d upper = hierarchy.domain_upper();
+  key["domain"] = {lower.x, lower.y, lower.z, upper.x, upper.y, upper.z};
+  key["filter"] = filter_name(definition.filter);
+  key["page"] = {definition.page_size, definition.page_level};
+  key["mode"] = mode_name(scene.settings.mode);
+  key["size"] = {scene.settings.width, scene.settings.height};
+  key["view"] = to_json(scene.view);
+  if (scene.settings.mode == Mode::dvr) key["transfer_function"] = to_json(scene.transfer_function);
+  if (scene.region)
+    for (const Vec3d& corner : *scene.region) key["region"].push_back({corner.x, corner.y, corner.z});
+  key["step"] = step;
+  key["method"] = 1;
+  hash = configuration_hash(key);
+  const fs::path path = folder / (hash + ".npy");
+  if (fs::exists(path)) return read_npy(path);
+  const Picture picture = HierarchyReference(hierarchy, 0, definition).render(scene, step);
+  fs::create_directories(folder);
+  write_npy(picture, path, true);
+  return picture;
+}
+
+RunSummary run_experiment(const Experiment& experiment, const RunOptions& options) {
+  std::error_code error;
+  fs::create_directories(options.folder, error);
+  if (error) throw Error(fmt::format("output folder {}: {}", options.folder.string(), error.message()));
+  Experiment settled = experiment;  // records are named by what was really used
+  if (options.context) settled.context = context_kind_name(*options.context);
+  if (options.memory_limit) settled.memory_limit = options.memory_limit;
+  return Runner(settled, options).run();
+}
+
+}  // namespace amrtex

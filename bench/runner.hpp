@@ -1,0 +1,46 @@
+// Running experiments: build, upload, draw, check, time, record.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "bench/experiment.hpp"
+#include "renderers/context.hpp"
+#include "renderers/raycaster.hpp"
+
+namespace amrtex {
+
+struct RunOptions {
+  std::filesystem::path folder;              ///< records, pictures and references are written below it
+  bool force = false;                        ///< measure again what has a record
+  std::optional<ContextKind> context;        ///< overrides the experiment's
+  std::optional<std::int64_t> memory_limit;  ///< bytes of one build; overrides the experiment's
+  std::function<void(const std::string&)> progress = [](const std::string&) {};
+};
+
+struct RunSummary {
+  int measured = 0;  ///< records with status ok, written now
+  int kept = 0;      ///< had a record already
+  int unsupported = 0;
+  int over_budget = 0;
+  int failed = 0;
+};
+
+/// Measures every point that has no record yet. Points that fail or cannot be done
+/// become records too; throws only for what concerns the whole experiment.
+RunSummary run_experiment(const Experiment& experiment, const RunOptions& options);
+
+/// The mesh of one data set of an experiment, with the field that is wanted first.
+AmrHierarchy load_dataset(const DatasetSource& source);
+
+/// The picture of the scene by the double reference of `definition`, from the cache
+/// below `folder` where it was drawn before. `hash` receives the name of that file.
+Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definition, const Scene& scene, double step,
+                         const std::filesystem::path& folder, std::string& hash);
+
+/// Frame times through Google Benchmark with manual time: `warm_up` frames are dropped.
+std::vector<FrameTime> time_frames(Raycaster& raycaster, int warm_up, int frames);
+
+}  // namespace amrtex

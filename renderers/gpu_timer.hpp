@@ -1,0 +1,22 @@
+// Time that GL itself measures, apart from the wall clock around glFinish.
+#pragma once
+
+#include "renderers/gl_objects.hpp"
+
+namespace amrtex {
+
+/// One GL_TIME_ELAPSED query. On a software rasteriser it is CPU time of its threads.
+class GpuTimer {
+ public:
+  explicit GpuTimer(Context& context);
+  void begin();
+  void end();
+  /// Milliseconds between the last begin() and end(); waits for the result.
+  double milliseconds() const;
+
+ private:
+  Context* context_;
+  GlQuery query_;
+};
+
+}  // namespace amrtex

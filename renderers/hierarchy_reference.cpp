@@ -1,0 +1,235 @@
+#include "renderers/hierarchy_reference.hpp"
+
+#include <fmt/format.h>
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <cmath>
+
+#include "renderers/reference_field.hpp"
+#include "renderers/reference_tracer.hpp"
+
+namespace amrtex {
+namespace {
+
+constexpr int kTile = 16;  // pixels; neighbouring rays share the cells in the caches
+
+/// What a picture needs besides the field, worked out once.
+struct Drawing {
+  CameraFrame camera;
+  Vec3d lower, upper;    // of what is drawn, finest space
+  Vec3d domain_lower;    // world
+  Vec3d cells_a_length;  // finest cells a world length, along the axes
+  Mode mode;
+  double part;           // world length of the largest part
+  const TransferTable* table;
+};
+
+Vec3d to_index(const AmrHierarchy& h, const Vec3d& p_world) {
+  return (p_world - h.domain_lower()) * Vec3d(h.cells(h.finest_level())) / (h.domain_upper() - h.domain_lower());
+}
+
+Drawing make_drawing(const AmrHierarchy& h, const Scene& scene, double step, const TransferTable* table) {
+  const Vec3d domain(h.cells(h.finest_level()));
+  const Vec3d spacing = h.spacing(h.finest_level());
+  Drawing d{camera_frame(scene.view, scene.settings.width, scene.settings.height),
+            Vec3d(0),
+            domain,
+            h.domain_lower(),
+            domain / (h.domain_upper() - h.domain_lower()),
+            scene.settings.mode,
+            step * std::min({spacing.x, spacing.y, spacing.z}),
+            table};
+  if (scene.region) {
+    d.lower = glm::max(d.lower, to_index(h, (*scene.region)[0]));
+    d.upper = glm::min(d.upper, to_index(h, (*scene.region)[1]));
+  }
+  return d;
+}
+
+struct Span {
+  double from, to;
+};
+
+/// The ray's stretch in a closed box, not before its start; nullopt where they do not meet.
+std::optional<Span> stretch_in(const IndexRay& ray, const Vec3d& lower, const Vec3d& upper) {
+  Span span{0, std::numeric_limits<double>::infinity()};
+  for (int a = 0; a < 3; ++a) {
+    if (ray.direction[a] == 0) {
+      if (ray.origin[a] < lower[a] || ray.origin[a] > upper[a]) return std::nullopt;
+      continue;
+    }
+    const double t0 = (lower[a] - ray.origin[a]) / ray.direction[a];
+    const double t1 = (upper[a] - ray.origin[a]) / ray.direction[a];
+    span.from = std::max(span.from, std::min(t0, t1));
+    span.to = std::min(span.to, std::max(t0, t1));
+  }
+  if (!(span.to > span.from)) return std::nullopt;
+  return span;
+}
+
+void draw_light(ReferenceTracer& tracer, const IndexRay& ray, double end, const Drawing& drawing, double* pixel) {
+  LightIntegral light(*drawing.table);
+  tracer.trace(ray, end, [&](const PieceFunction& f, double from, double to) {
+    light.add(f, to - from, drawing.part);
+    return light.transmittance() >= LightIntegral::kOpaque;
+  });
+  for (int c = 0; c < 3; ++c) pixel[c] = light.color()[c];
+  pixel[3] = 1 - light.transmittance();
+}
+
+double line_integral(ReferenceTracer& tracer, const IndexRay& ray, double end, double part) {
+  double sum = 0;
+  tracer.trace(ray, end, [&](const PieceFunction& f, double from, double to) {
+    sum += (to - from) * mean(f, static_cast<int>(std::clamp(std::ceil((to - from) / part), 1.0, 16.0)));
+    return true;
+  });
+  return sum;
+}
+
+double line_maximum(ReferenceTracer& tracer, const IndexRay& ray, double end) {
+  double best = -std::numeric_limits<double>::infinity();
+  tracer.trace(ray, end, [&](const PieceFunction& f, double, double) {
+    if (f.upper > best) best = std::max(best, maximum(f));
+    return true;
+  });
+  return std::isfinite(best) ? best : 0;
+}
+
+void draw_pixel(ReferenceTracer& tracer, const Drawing& drawing, int x, int y, Picture& picture) {
+  const WorldRay world = camera_ray(drawing.camera, x, y, picture.width, picture.height);
+  IndexRay ray{(world.origin - drawing.domain_lower) * drawing.cells_a_length, world.direction * drawing.cells_a_length};
+  const auto span = stretch_in(ray, drawing.lower, drawing.upper);
+  if (!span) return;
+  ray.origin += span->from * ray.direction;  // from here on no digits are spent on the way to the mesh
+  const double end = span->to - span->from;
+  double* pixel = picture.pixel(x, y);
+  switch (drawing.mode) {
+    case Mode::dvr: draw_light(tracer, ray, end, drawing, pixel); break;
+    case Mode::projection: *pixel = line_integral(tracer, ray, end, drawing.part); break;
+    case Mode::mip: *pixel = line_maximum(tracer, ray, end); break;
+  }
+}
+
+void check(const Scene& scene, double step) {
+  if (!(step > 0)) throw Error(fmt::format("reference step {}: must be a positive number of cell widths", step));
+  if (scene.settings.width < 1 || scene.settings.height < 1)
+    throw Error(fmt::format("picture of {} x {} pixels: both must be at least 1", scene.settings.width, scene.settings.height));
+  if (scene.settings.mode == Mode::dvr) validate(scene.transfer_function);
+}
+
+double extinction_scale(const AmrHierarchy& h, const TransferFunction& tf) {
+  const Vec3d edges = h.domain_upper() - h.domain_lower();
+  return tf.length_unit == TransferFunction::LengthUnit::world ? 1 : 1 / std::max({edges.x, edges.y, edges.z});
+}
+
+}  // namespace
+
+std::optional<FinestPosition> finest_position(const AmrHierarchy& hierarchy, const Vec3d& p_world) {
+  const Vec3i cells = hierarchy.cells(hierarchy.finest_level());
+  const Vec3d x = to_index(hierarchy, p_world);
+  FinestPosition p{};
+  for (int a = 0; a < 3; ++a) {
+    if (!(p_world[a] >= hierarchy.domain_lower()[a] && p_world[a] <= hierarchy.domain_upper()[a])) return std::nullopt;
+    p.cell[a] = std::min(static_cast<int>(std::min(x[a], 2147483647.0)), cells[a] - 1);
+    p.fraction[a] = std::min(x[a] - p.cell[a], std::nextafter(1.0, 0.0));
+  }
+  return p;
+}
+
+struct HierarchyReference::Data {
+  ReferenceField field;
+
+  double linear(int level, const FinestPosition& p) const;
+  double vertex(const ReferenceLeaf& leaf, const FinestPosition& p) const;
+  double basis(const FinestPosition& p) const;
+};
+
+namespace {
+
+/// Place in a cell of a level, in its widths from its lower corner.
+Vec3d place_in_cell(const FinestPosition& p, int width) { return (Vec3d(p.cell % width) + p.fraction) / Vec3d(width); }
+
+struct DualPlace {
+  Vec3i lower;  // of the cells between whose centres the position lies
+  Vec3d q;      // from that cell's centre, cell widths
+};
+DualPlace dual_place(const FinestPosition& p, int width) {
+  DualPlace place{p.cell / width, place_in_cell(p, width)};
+  for (int a = 0; a < 3; ++a) {
+    const bool below = place.q[a] < 0.5;
+    place.lower[a] -= below ? 1 : 0;
+    place.q[a] += below ? 0.5 : -0.5;
+  }
+  return place;
+}
+
+}  // namespace
+
+double HierarchyReference::Data::linear(int level, const FinestPosition& p) const {
+  const DualPlace place = dual_place(p, field.width(level));
+  return Trilinear::through(field.dual_cell(level, place.lower).values)(place.q);
+}
+
+double HierarchyReference::Data::vertex(const ReferenceLeaf& leaf, const FinestPosition& p) const {
+  return Trilinear::through(field.leaf_vertices(leaf, nullptr))(place_in_cell(p, field.width(leaf.level)));
+}
+
+double HierarchyReference::Data::basis(const FinestPosition& p) const {
+  double numerator = 0;
+  double denominator = 0;
+  for (int level = 0; level < field.hierarchy().level_count(); ++level) {
+    const DualPlace place = dual_place(p, field.width(level));
+    const auto cell = field.basis_cell(level, place.lower);
+    numerator += Trilinear::through(cell.values)(place.q);
+    denominator += Trilinear::through(cell.weights)(place.q);
+    if (!cell.finer) break;
+  }
+  return numerator / denominator;
+}
+
+HierarchyReference::HierarchyReference(const AmrHierarchy& hierarchy, int field, FilterDefinition definition)
+    : data_(new Data{ReferenceField(hierarchy, field, definition)}) {}
+HierarchyReference::~HierarchyReference() = default;
+
+std::optional<double> HierarchyReference::sample(const FinestPosition& p) const {
+  const AmrHierarchy& h = data_->field.hierarchy();
+  if (!h.domain(h.finest_level()).contains(p.cell)) return std::nullopt;
+  const ReferenceLeaf leaf = data_->field.find_leaf(p.cell);
+  if (leaf.level < 0 || std::isnan(leaf.value)) return std::nullopt;
+  switch (data_->field.definition().filter) {
+    case Filter::nearest: return leaf.value;
+    case Filter::linear_lod: return data_->linear(leaf.level, p);
+    case Filter::linear_page: return data_->linear(data_->field.page_level(p.cell), p);
+    case Filter::linear_vertex: return data_->vertex(leaf, p);
+    case Filter::basis: return data_->basis(p);
+  }
+  return std::nullopt;
+}
+
+std::optional<double> HierarchyReference::sample(const Vec3d& p_world) const {
+  const auto p = finest_position(data_->field.hierarchy(), p_world);
+  return p ? sample(*p) : std::nullopt;
+}
+
+Picture HierarchyReference::render(const Scene& scene, double step) const {
+  check(scene, step);
+  const AmrHierarchy& h = data_->field.hierarchy();
+  std::optional<TransferTable> table;
+  if (scene.settings.mode == Mode::dvr) table.emplace(scene.transfer_function, extinction_scale(h, scene.transfer_function));
+  const Drawing drawing = make_drawing(h, scene, step, table ? &*table : nullptr);
+  Picture picture(scene.settings.width, scene.settings.height, scene.settings.mode == Mode::dvr ? 4 : 1);
+  const int columns = ceil_div(picture.width, kTile);
+  tbb::enumerable_thread_specific<ReferenceTracer> tracers([&] { return ReferenceTracer(data_->field); });
+  tbb::parallel_for(0, columns * ceil_div(picture.height, kTile), [&](int tile) {
+    ReferenceTracer& tracer = tracers.local();
+    const int x0 = tile % columns * kTile;
+    const int y0 = tile / columns * kTile;
+    for (int y = y0; y < std::min(y0 + kTile, picture.height); ++y)
+      for (int x = x0; x < std::min(x0 + kTile, picture.width); ++x) draw_pixel(tracer, drawing, x, y, picture);
+  });
+  return picture;
+}
+
+}  // namespace amrtex

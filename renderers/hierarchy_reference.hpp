@@ -1,0 +1,45 @@
+// The filters of shaders/README.md in double precision, by search in the AmrHierarchy.
+// Shares no code with encodings or shaders: what they are judged against.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "renderers/picture.hpp"
+#include "renderers/scene.hpp"
+#include "structures/amr_hierarchy.hpp"
+
+namespace amrtex {
+
+/// A position as everywhere in the contract: a cell of the finest level and a fraction in [0, 1).
+struct FinestPosition {
+  Vec3i cell;
+  Vec3d fraction;
+};
+
+/// World -> finest position; a point on a face belongs to the upper cell, the domain's
+/// last face to its last cell. nullopt outside the domain.
+std::optional<FinestPosition> finest_position(const AmrHierarchy& hierarchy, const Vec3d& p_world);
+
+/// Safe to use from several threads.
+class HierarchyReference {
+ public:
+  HierarchyReference(const AmrHierarchy& hierarchy, int field, FilterDefinition definition);
+  ~HierarchyReference();
+
+  /// f(p); nullopt where there is no value (outside, holes, NaN or infinite leaf).
+  std::optional<double> sample(const FinestPosition& p) const;
+  std::optional<double> sample(const Vec3d& p_world) const;
+
+  /// Draws the scene: each ray is split wherever the filter is not smooth, pieces are
+  /// integrated in parts of at most `step` finest cell widths. Uses all cores.
+  /// Independent of the scene's step, sampling, skip and early_end.
+  Picture render(const Scene& scene, double step) const;
+
+ private:
+  struct Data;
+  std::unique_ptr<Data> data_;
+};
+
+}  // namespace amrtex

@@ -1,0 +1,48 @@
+// Float pictures: what consumers and references return and what metrics compare.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace amrtex {
+
+/// Linear values, first row on top. 4 channels: premultiplied RGBA (mode dvr);
+/// 1 channel: the raw value of the modes projection and mip. Pictures of the GL
+/// context hold floats exactly.
+struct Picture {
+  int width = 0;
+  int height = 0;
+  int channels = 4;
+  std::vector<double> values;  ///< channel fastest, then x, then y
+
+  Picture() = default;
+  Picture(int w, int h, int c)
+      : width(w), height(h), channels(c), values(static_cast<std::size_t>(w) * static_cast<std::size_t>(h) * static_cast<std::size_t>(c)) {}
+  double* pixel(int x, int y) {
+    return &values[(static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)) *
+                   static_cast<std::size_t>(channels)];
+  }
+  const double* pixel(int x, int y) const { return const_cast<Picture*>(this)->pixel(x, y); }
+};
+
+/// Hash of the values as 32-bit floats.
+std::string picture_hash(const Picture& picture);
+
+/// NumPy format, shape (height, width, channels); `as_double` for references.
+/// Written to a temporary name first. Throws Error with the path.
+void write_npy(const Picture& picture, const std::filesystem::path& path, bool as_double);
+Picture read_npy(const std::filesystem::path& path);
+
+struct PngOptions {
+  std::array<double, 3> background{0, 0, 0};  ///< linear RGB behind premultiplied colour
+  bool color_bar = false;                     ///< one-channel pictures: a bar with minimum, maximum and unit
+  bool logarithmic = false;                   ///< one-channel pictures: colours over log10(value)
+  std::string unit;                           ///< printed beside the bar
+};
+/// 8-bit sRGB to look at; one-channel pictures through a colour map over their range.
+void write_png(const Picture& picture, const std::filesystem::path& path, const PngOptions& options = {});
+
+}  // namespace amrtex

@@ -1,0 +1,19 @@
+// The field of an encoding at given points: on the GL context and on the CPU.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "renderers/cpu_field.hpp"
+#include "renderers/gpu_field.hpp"
+#include "renderers/hierarchy_reference.hpp"
+
+namespace amrtex {
+
+/// The shader's positions: the fraction as float, so that GL and CPU see the same point.
+std::vector<ProbeResult> probe_on_gl(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const GpuField& gpu,
+                                     std::span<const FinestPosition> points);
+std::vector<ProbeResult> probe_on_cpu(const AmrHierarchy& hierarchy, const EncodedField& field, Precision precision,
+                                      std::span<const FinestPosition> points);
+
+}  // namespace amrtex

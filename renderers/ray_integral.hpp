@@ -1,0 +1,102 @@
+// What one piece of a ray adds to a pixel, in double precision: f along a piece is a
+// quotient of two cubics, the transfer function is linear between its points.
+#pragma once
+
+#include <array>
+#include <limits>
+#include <vector>
+
+#include "renderers/scene.hpp"
+
+namespace amrtex {
+
+/// A polynomial of degree 3 in the piece's own parameter s in [0, 1].
+struct Cubic {
+  std::array<double, 4> c{};
+  double operator()(double s) const { return c[0] + s * (c[1] + s * (c[2] + s * c[3])); }
+  double integral() const { return c[0] + c[1] / 2 + c[2] / 3 + c[3] / 4; }
+  Cubic& operator+=(const Cubic& other);
+};
+
+/// The extrema of the cubic inside (0, 1), ascending; returns how many.
+int extrema_in_unit(const Cubic& f, std::array<double, 2>& out);
+/// The changes of sign of the cubic inside (0, 1), ascending; returns how many.
+int roots_in_unit(const Cubic& f, std::array<double, 3>& out);
+
+/// f along a piece: numerator / denominator; the denominator is 1 for all filters but `basis`.
+struct PieceFunction {
+  Cubic numerator;
+  Cubic denominator;
+  bool rational = false;
+  double lower = 0;  ///< bounds of f over the piece, not necessarily reached
+  double upper = 0;
+  double operator()(double s) const { return rational ? numerator(s) / denominator(s) : numerator(s); }
+};
+
+/// Largest value of f over the piece.
+double maximum(const PieceFunction& f);
+/// Mean of f over the piece: exact for polynomials; quotients in `parts` parts with 4 Gauss points each.
+double mean(const PieceFunction& f, int parts);
+
+/// The transfer function as segments between the points of both its curves.
+class TransferTable {
+ public:
+  /// `extinction_scale` turns the transfer function's extinction into one per world length.
+  TransferTable(const TransferFunction& transfer_function, double extinction_scale);
+
+  struct Light {
+    double extinction;  ///< per world length
+    Vec3d rgb;
+  };
+  struct Segment {
+    double axis_lower, inverse_width;  ///< of value or log10(value); 0 where the segment is constant
+    Light lower, upper;
+    bool constant;      ///< both curves
+    bool one_color;
+    bool visible;       ///< extinction is not 0 throughout
+  };
+
+  const std::vector<double>& knots() const { return knots_; }
+  bool logarithmic() const { return logarithmic_; }
+  /// Segment k lies between knots k - 1 and k.
+  std::size_t segment_of(double value) const;
+  const Segment& segment(std::size_t k) const { return segments_[k]; }
+  bool visible(std::size_t first, std::size_t last) const { return visible_before_[last + 1] > visible_before_[first]; }
+  Light light(const Segment& segment, double value) const;
+
+ private:
+  bool logarithmic_;
+  std::vector<double> knots_;
+  std::vector<Segment> segments_;
+  std::vector<int> visible_before_;  // visible segments below each
+};
+
+/// Emission and absorption along one ray, front to back: dC = T k c ds, dT = -T k ds.
+class LightIntegral {
+ public:
+  /// Transmittance behind which nothing is added: far below what a float picture can show.
+  static constexpr double kOpaque = 1e-12;
+
+  explicit LightIntegral(const TransferTable& table) : table_(table) {}
+
+  /// Adds a piece of `length`, in parts of at most `max_part` (both world), or of a 16th of
+  /// the piece where these are thin.
+  void add(const PieceFunction& f, double length, double max_part);
+
+  double transmittance() const { return transmittance_; }
+  const Vec3d& color() const { return color_; }
+
+ private:
+  void add_interval(const PieceFunction& f, double from, double to, double length, double max_part);
+  void add_parts(const PieceFunction& f, const TransferTable::Segment& segment, double middle, double width, double length,
+                 double max_part);
+  void add_part(const TransferTable::Light& first, const TransferTable::Light& second, double depth);
+
+  const TransferTable& table_;
+  Vec3d color_{0};  // premultiplied
+  double depth_ = 0;  // optical, from the eye
+  double transmittance_ = 1;
+  std::vector<double> breaks_;
+};
+
+}  // namespace amrtex

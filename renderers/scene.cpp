@@ -1,0 +1,247 @@
+#include "renderers/scene.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <limits>
+#include <span>
+
+namespace amrtex {
+namespace {
+
+bool finite(const Vec3d& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+/// Unit vector; scaled first, so that views of worlds of 1e200 or 1e-200 work.
+Vec3d direction_of(const Vec3d& v, const char* what) {
+  const double size = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  if (!(size > 0) || !finite(v)) throw Error(fmt::format("view: {}", what));
+  return glm::normalize(v / size);
+}
+
+/// Place of x among ascending points: the upper one's index and the weight of it.
+template <class Point, class Axis>
+std::pair<std::size_t, double> find_segment(const std::vector<Point>& points, double x, Axis&& axis) {
+  if (points.empty() || !(x > axis(points.front().value))) return {0, 1};
+  std::size_t k = 1;
+  while (k < points.size() && x >= axis(points[k].value)) ++k;
+  if (k == points.size()) return {k - 1, 1};
+  const double a = axis(points[k - 1].value);
+  return {k, (x - a) / (axis(points[k].value) - a)};
+}
+
+template <class Point>
+void check_points(const std::vector<Point>& points, const char* key, bool logarithmic) {
+  if (points.empty()) throw Error(fmt::format("transfer function: '{}' has no point; at least one is needed", key));
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const double v = points[k].value;
+    if (!std::isfinite(v)) throw Error(fmt::format("transfer function: '{}' point {}: the value {} is not finite", key, k, v));
+    if (logarithmic && v <= 0)
+      throw Error(fmt::format("transfer function: '{}' point {}: the value {} must be above 0 on a logarithmic scale", key, k, v));
+    if (k > 0 && !(v > points[k - 1].value))
+      throw Error(fmt::format("transfer function: '{}' point {}: the value {} does not lie above the one before, {}", key, k, v,
+                              points[k - 1].value));
+  }
+}
+
+void check_keys(const Json& json, const char* what, std::span<const char* const> accepted) {
+  if (!json.is_object()) throw UsageError(fmt::format("{}: must be an object with the keys {}", what, fmt::join(accepted, ", ")));
+  for (const auto& item : json.items())
+    if (std::find(accepted.begin(), accepted.end(), item.key()) == accepted.end())
+      throw UsageError(fmt::format("{}: unknown key '{}'; accepted are {}", what, item.key(), fmt::join(accepted, ", ")));
+}
+
+double number(const Json& json, const char* what, const char* key) {
+  if (!json.is_number()) throw UsageError(fmt::format("{}: '{}' must be a number, not {}", what, key, json.dump()));
+  return json.get<double>();
+}
+
+/// A list of `n` numbers.
+std::vector<double> numbers(const Json& json, std::size_t n, const char* what, const char* key, const char* accepted) {
+  std::vector<double> out;
+  if (json.is_array())
+    for (const Json& v : json)
+      if (v.is_number()) out.push_back(v.get<double>());
+  if (!json.is_array() || json.size() != n || out.size() != n)
+    throw UsageError(fmt::format("{}: '{}' accepts {}, not {}", what, key, accepted, json.dump()));
+  return out;
+}
+
+Vec3d vector_of(const Json& json, const char* what, const char* key) {
+  const auto v = numbers(json, 3, what, key, "three numbers [x, y, z]");
+  return {v[0], v[1], v[2]};
+}
+
+std::string choice(const Json& json, const char* what, const char* key, std::span<const char* const> accepted) {
+  const std::string given = json.is_string() ? json.get<std::string>() : json.dump();
+  if (std::find(accepted.begin(), accepted.end(), given) == accepted.end())
+    throw UsageError(fmt::format("{}: '{}' accepts {}, not {}", what, key, fmt::join(accepted, ", "), given));
+  return given;
+}
+
+const Json& points_of(const Json& json, const char* key) {
+  const auto it = json.find(key);
+  if (it == json.end() || !it->is_array() || it->empty())
+    throw UsageError(fmt::format("transfer_function: '{}' must be a list of points", key));
+  return *it;
+}
+
+Json list(const Vec3d& v) { return Json::array({v.x, v.y, v.z}); }
+
+}  // namespace
+
+CameraFrame camera_frame(const View& view, int width, int height) {
+  if (width < 1 || height < 1) throw Error(fmt::format("view: a picture of {} x {} pixels; both must be at least 1", width, height));
+  CameraFrame camera;
+  camera.eye = view.eye;
+  camera.orthographic = view.orthographic;
+  camera.forward = direction_of(view.at - view.eye, "'eye' and 'at' must be finite and differ");
+  const Vec3d right = glm::cross(camera.forward, direction_of(view.up, "'up' must be finite and not 0"));
+  if (!(glm::length(right) > 1e-9)) throw Error("view: 'up' must not be parallel to the direction from 'eye' to 'at'");
+  double half_height = view.height / 2;
+  if (view.orthographic) {
+    if (!(view.height > 0) || !std::isfinite(view.height)) throw Error(fmt::format("view: 'height' is {}; it must be positive", view.height));
+  } else {
+    if (!(view.fov_y > 0 && view.fov_y < 180)) throw Error(fmt::format("view: 'fov_y' is {}; it must lie between 0 and 180 degrees", view.fov_y));
+    half_height = std::tan(glm::radians(view.fov_y) / 2);
+  }
+  camera.right = glm::normalize(right) * (half_height * width / height);
+  camera.up = glm::normalize(glm::cross(right, camera.forward)) * half_height;
+  return camera;
+}
+
+WorldRay camera_ray(const CameraFrame& camera, int x, int y, int width, int height) {
+  const double u = 2 * (x + 0.5) / width - 1;
+  const double v = 1 - 2 * (y + 0.5) / height;
+  const Vec3d across = camera.right * u + camera.up * v;
+  if (camera.orthographic) return {camera.eye + across, camera.forward};
+  return {camera.eye, glm::normalize(camera.forward + across)};
+}
+
+double TransferFunction::axis(double value) const {
+  if (!logarithmic) return value;
+  return value > 0 ? std::log10(value) : -std::numeric_limits<double>::infinity();
+}
+
+double TransferFunction::extinction_at(double value) const {
+  if (extinction.empty()) return 0;
+  const auto [k, w] = find_segment(extinction, axis(value), [&](double v) { return axis(v); });
+  const double upper = extinction[k].extinction;
+  if (w == 1) return upper;
+  const double lower = extinction[k - 1].extinction;
+  if (w == 0) return lower;
+  // between two points of which one is infinite all is; 0 times infinity would be no number
+  return std::isinf(lower + upper) ? lower + upper : lower + w * (upper - lower);
+}
+
+Vec3d TransferFunction::color_at(double value) const {
+  if (color.empty()) return Vec3d(0);
+  const auto [k, w] = find_segment(color, axis(value), [&](double v) { return axis(v); });
+  if (w == 1) return color[k].rgb;
+  return color[k - 1].rgb + w * (color[k].rgb - color[k - 1].rgb);
+}
+
+double TransferFunction::max_extinction(double min, double max) const {
+  double most = std::max(extinction_at(min), extinction_at(max));
+  for (const ExtinctionPoint& p : extinction)
+    if (p.value >= min && p.value <= max) most = std::max(most, p.extinction);
+  return most;
+}
+
+void validate(const TransferFunction& tf) {
+  check_points(tf.extinction, "extinction", tf.logarithmic);
+  check_points(tf.color, "color", tf.logarithmic);
+  for (std::size_t k = 0; k < tf.extinction.size(); ++k)
+    if (!(tf.extinction[k].extinction >= 0))
+      throw Error(fmt::format("transfer function: 'extinction' point {}: the extinction {} must not be negative", k, tf.extinction[k].extinction));
+  for (std::size_t k = 0; k < tf.color.size(); ++k)
+    for (int c = 0; c < 3; ++c)
+      if (!(tf.color[k].rgb[c] >= 0 && tf.color[k].rgb[c] <= 1))
+        throw Error(fmt::format("transfer function: 'color' point {}: {} must lie between 0 and 1", k, tf.color[k].rgb[c]));
+}
+
+std::string_view mode_name(Mode mode) {
+  switch (mode) {
+    case Mode::dvr: return "dvr";
+    case Mode::projection: return "projection";
+    case Mode::mip: return "mip";
+  }
+  return "";
+}
+
+std::string_view sampling_name(Sampling sampling) { return sampling == Sampling::lattice ? "lattice" : "adaptive"; }
+
+Mode parse_mode(std::string_view name) {
+  for (const Mode mode : {Mode::dvr, Mode::projection, Mode::mip})
+    if (name == mode_name(mode)) return mode;
+  throw UsageError(fmt::format("unknown mode '{}'; accepted are dvr, projection, mip", name));
+}
+
+Sampling parse_sampling(std::string_view name) {
+  for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive})
+    if (name == sampling_name(sampling)) return sampling;
+  throw UsageError(fmt::format("unknown sampling '{}'; accepted are lattice, adaptive", name));
+}
+
+View parse_view(const Json& json) {
+  constexpr std::array<const char*, 6> kKeys{"eye", "at", "up", "projection", "fov_y", "height"};
+  constexpr std::array<const char*, 2> kProjections{"perspective", "orthographic"};
+  check_keys(json, "view", kKeys);
+  for (const char* key : {"eye", "at"})
+    if (!json.contains(key)) throw UsageError(fmt::format("view: the key '{}' is missing; it accepts three numbers [x, y, z]", key));
+  View view;
+  view.eye = vector_of(json["eye"], "view", "eye");
+  view.at = vector_of(json["at"], "view", "at");
+  if (json.contains("up")) view.up = vector_of(json["up"], "view", "up");
+  if (json.contains("projection")) view.orthographic = choice(json["projection"], "view", "projection", kProjections) == "orthographic";
+  if (view.orthographic != json.contains("height"))
+    throw UsageError("view: 'height' (world height of the picture) belongs to the projection 'orthographic' and only there");
+  if (view.orthographic && json.contains("fov_y")) throw UsageError("view: 'fov_y' belongs to the projection 'perspective'");
+  if (view.orthographic) view.height = number(json["height"], "view", "height");
+  if (json.contains("fov_y")) view.fov_y = number(json["fov_y"], "view", "fov_y");
+  return view;
+}
+
+TransferFunction parse_transfer_function(const Json& json) {
+  constexpr std::array<const char*, 4> kKeys{"extinction", "color", "scale", "length_unit"};
+  constexpr std::array<const char*, 2> kScales{"linear", "log"};
+  constexpr std::array<const char*, 2> kUnits{"longest_edge", "world"};
+  constexpr const char* kWhat = "transfer_function";
+  check_keys(json, kWhat, kKeys);
+  TransferFunction tf;
+  for (const Json& point : points_of(json, "extinction")) {
+    const auto p = numbers(point, 2, kWhat, "extinction", "points [value, extinction]");
+    tf.extinction.push_back({p[0], p[1]});
+  }
+  for (const Json& point : points_of(json, "color")) {
+    const auto p = numbers(point, 4, kWhat, "color", "points [value, r, g, b]");
+    tf.color.push_back({p[0], {p[1], p[2], p[3]}});
+  }
+  if (json.contains("scale")) tf.logarithmic = choice(json["scale"], kWhat, "scale", kScales) == "log";
+  if (json.contains("length_unit") && choice(json["length_unit"], kWhat, "length_unit", kUnits) == "world")
+    tf.length_unit = TransferFunction::LengthUnit::world;
+  validate(tf);
+  return tf;
+}
+
+Json to_json(const View& view) {
+  Json json{{"eye", list(view.eye)}, {"at", list(view.at)}, {"up", list(view.up)}};
+  if (view.orthographic) {
+    json["projection"] = "orthographic";
+    json["height"] = view.height;
+  } else {
+    json["fov_y"] = view.fov_y;
+  }
+  return json;
+}
+
+Json to_json(const TransferFunction& tf) {
+  Json json{{"extinction", Json::array()}, {"color", Json::array()}};
+  for (const auto& p : tf.extinction) json["extinction"].push_back(Json::array({p.value, p.extinction}));
+  for (const auto& p : tf.color) json["color"].push_back(Json::array({p.value, p.rgb.r, p.rgb.g, p.rgb.b}));
+  json["scale"] = tf.logarithmic ? "log" : "linear";
+  json["length_unit"] = tf.length_unit == TransferFunction::LengthUnit::world ? "world" : "longest_edge";
+  return json;
+}
+
+}  // namespace amrtex

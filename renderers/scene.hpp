@@ -1,0 +1,103 @@
+// What is drawn and how, independent of any encoding: view, transfer function, settings.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "structures/encoding.hpp"
+
+namespace amrtex {
+
+/// A camera. The picture's first row is its top.
+struct View {
+  Vec3d eye{0, 0, 3};   ///< world
+  Vec3d at{0};          ///< world
+  Vec3d up{0, 0, 1};    ///< any length, not parallel to at - eye
+  double fov_y = 35;    ///< vertical field of view, degrees; perspective only
+  bool orthographic = false;
+  double height = 1;    ///< world height of the picture; orthographic only
+};
+
+/// A view resolved for a picture size. The ray of pixel (x, y), y from the top, with
+/// u = 2 (x + 1/2) / width - 1 and v = 1 - 2 (y + 1/2) / height, is
+///   perspective:  eye + t normalise(forward + u right + v up)
+///   orthographic: eye + u right + v up + t forward
+struct CameraFrame {
+  Vec3d eye{0};
+  Vec3d forward{0};  ///< unit length
+  Vec3d right{0};    ///< half of the picture's width at distance 1 (perspective) or in world units (orthographic)
+  Vec3d up{0};       ///< half of the picture's height, likewise
+  bool orthographic = false;
+};
+
+/// Throws Error when the view is degenerate.
+CameraFrame camera_frame(const View& view, int width, int height);
+
+struct WorldRay {
+  Vec3d origin;
+  Vec3d direction;  ///< unit length
+};
+WorldRay camera_ray(const CameraFrame& camera, int x, int y, int width, int height);
+
+/// Value -> emitted colour and extinction, both piecewise linear over the value or
+/// its logarithm; constant beyond the first and last point.
+struct TransferFunction {
+  struct ExtinctionPoint {
+    double value;
+    double extinction;  ///< per length, see length_unit
+  };
+  struct ColorPoint {
+    double value;
+    Vec3d rgb;  ///< linear, in [0, 1]
+  };
+  enum class LengthUnit { longest_edge, world };
+
+  std::vector<ExtinctionPoint> extinction;  ///< ascending values
+  std::vector<ColorPoint> color;            ///< ascending values
+  bool logarithmic = false;                 ///< points are joined over log10(value); values <= 0 take the first point's
+  LengthUnit length_unit = LengthUnit::longest_edge;  ///< of 1 / extinction: the domain's longest edge, or the file's world unit
+
+  double axis(double value) const;  ///< value, or log10 of it
+  double extinction_at(double value) const;
+  Vec3d color_at(double value) const;
+  /// Largest extinction over [min, max].
+  double max_extinction(double min, double max) const;
+};
+
+/// Throws Error (points not ascending, negative or NaN extinction, none at all, log axis with values <= 0).
+void validate(const TransferFunction& transfer_function);
+
+enum class Mode { dvr, projection, mip };
+enum class Sampling { lattice, adaptive };
+std::string_view mode_name(Mode mode);
+std::string_view sampling_name(Sampling sampling);
+Mode parse_mode(std::string_view name);          ///< UsageError names the accepted ones
+Sampling parse_sampling(std::string_view name);  ///< UsageError names the accepted ones
+
+struct RenderSettings {
+  Mode mode = Mode::dvr;
+  Sampling sampling = Sampling::adaptive;
+  double step = 1;      ///< cell widths (smallest edge): of the finest level for lattice, of the region for adaptive
+  int width = 512;      ///< pixels
+  int height = 512;     ///< pixels
+  bool skip = true;     ///< regions that the transfer function makes invisible are skipped
+  std::optional<double> early_end;  ///< opacity at which a ray ends; off when absent
+};
+
+struct Scene {
+  View view;
+  TransferFunction transfer_function;
+  RenderSettings settings;
+  std::optional<std::array<Vec3d, 2>> region;  ///< sub-box to draw: lower and upper, world
+};
+
+/// JSON as in experiment and scene files; Errors name the key and what it accepts.
+View parse_view(const Json& json);
+TransferFunction parse_transfer_function(const Json& json);
+Json to_json(const View& view);
+Json to_json(const TransferFunction& transfer_function);
+
+}  // namespace amrtex

@@ -1,0 +1,30 @@
+// A scene as the shaders see it: defines, uniforms and tables. The same for the GL
+// context and for the CPU build of the same text.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "renderers/scene.hpp"
+#include "renderers/uniforms.hpp"
+
+namespace amrtex {
+
+struct SceneBindings {
+  std::vector<std::pair<std::string, int>> defines;
+  UniformValues uniforms;
+  std::vector<HostTexture> buffers;  ///< the transfer function's tables
+  bool transfer_exact = true;        ///< every point of the transfer function lies on an entry of the table
+};
+
+/// Uniforms of the contract alone (what probes need).
+UniformValues field_uniforms(const AmrHierarchy& hierarchy, const EncodedField& field);
+
+/// Everything that a consumer of shaders/march.glsl needs beside the field's own part.
+SceneBindings bind_scene(const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene);
+
+/// What builders may leave out for this scene.
+SceneNeeds scene_needs(const Scene& scene, Filter filter, Filtering filtering);
+
+}  // namespace amrtex

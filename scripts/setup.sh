@@ -1,0 +1,65 @@
+#!/usr/bin/env bash
+# Installs what amrtex needs from the distribution's packages, and nothing else.
+# Debian 12: Mesa comes from bookworm-backports, because 22.3 has no bindless
+# textures and marches 1.2-1.5 times slower; Debian 13 and Ubuntu 24.04 have a
+# new enough Mesa as stock. Runs as root or with sudo; does nothing when all is there.
+set -euo pipefail
+
+packages=(g++ cmake ninja-build pkg-config python3 python3-glad
+          libegl-dev libgl-dev libglm-dev libtbb-dev nlohmann-json3-dev libfmt-dev libspdlog-dev
+          libcli11-dev libpng-dev libxxhash-dev libgtest-dev libgmock-dev libbenchmark-dev librapidcheck-dev)
+mesa=(libgl1-mesa-dri libegl-mesa0 libglx-mesa0 mesa-vulkan-drivers libgbm1)
+# Mesa 25.1 dropped OSMesa; where a distribution has no package, the EGL path alone remains.
+osmesa=libosmesa6-dev
+
+run_as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
+installed() { dpkg-query -W -f='${Status}' "$1" 2>/dev/null | grep -q '^install ok installed$'; }
+mesa_version() { dpkg-query -W -f='${Version}' libgl1-mesa-dri 2>/dev/null || true; }
+install_quietly() {
+  run_as_root env DEBIAN_FRONTEND=noninteractive \
+    apt-get install -y -q --no-install-recommends -o Dpkg::Use-Pty=0 "$@" >"$log" 2>&1 ||
+    { tail -n 40 "$log" >&2; echo "setup: installing failed: $*" >&2; exit 1; }
+}
+
+. /etc/os-release
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+
+# The backports suite, derived from whichever source serves bookworm already.
+add_backports() {
+  local target=/etc/apt/sources.list.d/amrtex-backports.sources file
+  grep -rqsE '(Suites:|^deb ).*bookworm-backports' /etc/apt/sources.list /etc/apt/sources.list.d && return 0
+  for file in /etc/apt/sources.list.d/*.sources; do
+    [ -e "$file" ] || continue
+    # the first stanza that names plain "bookworm", with its suites replaced
+    awk 'BEGIN { RS = ""; FS = "\n" } /(^|\n)Suites:[^\n]*(^|[ \t])bookworm([ \t\n]|$)/ { print; exit }' "$file" |
+      sed -E '/^#/d; s/^Suites:.*/Suites: bookworm-backports/' >"$log"
+    if [ -s "$log" ]; then run_as_root cp "$log" "$target"; run_as_root chmod 644 "$target"; return 0; fi
+  done
+  local line
+  line=$(grep -hE '^deb .* bookworm ' /etc/apt/sources.list /etc/apt/sources.list.d/*.list 2>/dev/null | head -n 1) || true
+  [ -n "$line" ] || { echo "setup: no configured source for bookworm to derive bookworm-backports from" >&2; exit 1; }
+  printf '%s\n' "${line/ bookworm / bookworm-backports }" | run_as_root tee /etc/apt/sources.list.d/amrtex-backports.list >/dev/null
+}
+
+missing=()
+for package in "${packages[@]}" "${mesa[@]}"; do installed "$package" || missing+=("$package"); done
+backport_mesa=no
+if [ "${VERSION_CODENAME:-}" = bookworm ] && { [ -z "$(mesa_version)" ] || dpkg --compare-versions "$(mesa_version)" lt 25; }; then
+  backport_mesa=yes
+fi
+if [ ${#missing[@]} = 0 ] && [ $backport_mesa = no ] && { installed $osmesa || [ -e /var/lib/amrtex-no-osmesa ]; }; then
+  exit 0
+fi
+
+echo "setup: installing packages" >&2
+[ $backport_mesa = yes ] && add_backports
+run_as_root apt-get update -q >"$log" 2>&1 || { tail -n 20 "$log" >&2; echo "setup: apt-get update failed" >&2; exit 1; }
+if [ $backport_mesa = yes ]; then
+  install_quietly -t bookworm-backports "${mesa[@]}" $osmesa
+fi
+install_quietly "${packages[@]}" "${mesa[@]}"
+if ! installed $osmesa; then
+  if apt-cache show $osmesa >/dev/null 2>&1; then install_quietly $osmesa
+  else echo "setup: this distribution has no $osmesa; OSMesa contexts will be reported as unavailable" >&2; run_as_root touch /var/lib/amrtex-no-osmesa; fi
+fi

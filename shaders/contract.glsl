@@ -1,0 +1,118 @@
+// The sampler contract: what an encoding provides and what is built on it, once.
+// Prose: README.md. Spaces: integer cells of the finest level ("finest"), and cell
+// widths of a region from its lower corner ("region", the q below).
+#if !AMRTEX_CPP
+#ifndef AMRTEX_FILTER
+#error AMRTEX_FILTER must be defined: one of the AMRTEX_FILTER_... below
+#endif
+#ifndef AMRTEX_HARDWARE_FILTERING
+#error AMRTEX_HARDWARE_FILTERING must be defined: 1 where the texture unit interpolates, else 0
+#endif
+#ifndef AMRTEX_POWER_OF_TWO
+#error AMRTEX_POWER_OF_TWO must be defined: 1 where all refinement ratios are powers of two, else 0
+#endif
+#ifndef AMRTEX_LEVELS
+#error AMRTEX_LEVELS must be defined: number of levels
+#endif
+#ifndef AMRTEX_VALIDITY
+#error AMRTEX_VALIDITY must be defined: 1 where cells may have no value, else 0
+#endif
+#ifndef AMRTEX_VALUE_RANGES
+#error AMRTEX_VALUE_RANGES must be defined: 1 where regions know their value range, else 0
+#endif
+#ifndef AMRTEX_SCALED_STORAGE
+#error AMRTEX_SCALED_STORAGE must be defined: 1 where texels hold (value - a) / b, else 0
+#endif
+#endif
+DEFINE_INT(AMRTEX_FILTER)
+DEFINE_INT(AMRTEX_HARDWARE_FILTERING)
+DEFINE_INT(AMRTEX_POWER_OF_TWO)
+DEFINE_INT(AMRTEX_LEVELS)
+DEFINE_INT(AMRTEX_VALIDITY)
+DEFINE_INT(AMRTEX_VALUE_RANGES)
+DEFINE_INT(AMRTEX_SCALED_STORAGE)
+
+// the same numbers as enum class Filter (asserted in renderers/cpu_field.cpp.in)
+#define AMRTEX_FILTER_NEAREST 0
+#define AMRTEX_FILTER_LINEAR_LOD 1
+#define AMRTEX_FILTER_LINEAR_PAGE 2
+#define AMRTEX_FILTER_LINEAR_VERTEX 3
+#define AMRTEX_FILTER_BASIS 4
+
+STRUCT Position {
+  ivec3 cell;      // of the finest level
+  vec3r fraction;  // in [0, 1)
+};
+
+// Part of the domain where one locate() stays valid. Its corners are multiples of
+// its own cell width.
+STRUCT Region {
+  ivec3 lower;        // finest, inclusive
+  ivec3 upper;        // finest, exclusive
+  int level;
+  int width;          // of its cells, in finest cells
+  vec2r value_range;  // of every value that fetch_field can return here (AMRTEX_VALUE_RANGES)
+  ivec4 handle;       // the encoding's own
+};
+
+STRUCT FieldSample {
+  real value;
+  int level;
+};
+
+UNIFORM(ivec3, u_domain_cells)                // finest
+UNIFORM(vec2r, u_value_scale)                 // a, b of scaled storage
+UNIFORM_ARRAY(int, u_level_width, AMRTEX_LEVELS, 64)  // cell width of each level, in finest cells
+
+// Division of a cell index by the cell width of a level, towards minus infinity.
+ivec3 divide_by_width(IN(ivec3) cell, IN(int) width) {
+  if (AMRTEX_POWER_OF_TWO != 0) return cell >> findLSB(width);
+  ivec3 adjusted = cell - ivec3(lessThan(cell, ivec3(0))) * (width - 1);
+  return adjusted / width;
+}
+
+// The value that a texel of scaled storage stands for.
+real decode_value(IN(real) code) {
+  if (AMRTEX_SCALED_STORAGE == 0) return code;
+  return u_value_scale.x + u_value_scale.y * code;
+}
+
+// Trilinear interpolation; v[i] belongs to corner (i & 1, (i >> 1) & 1, i >> 2). Written
+// once and precise, so that every encoding's manual filter gives the same bits.
+real trilinear(IN(real) v0, IN(real) v1, IN(real) v2, IN(real) v3, IN(real) v4, IN(real) v5, IN(real) v6, IN(real) v7, IN(vec3r) f) {
+  PRECISE real x0 = v0 + (v1 - v0) * f.x;
+  PRECISE real x1 = v2 + (v3 - v2) * f.x;
+  PRECISE real x2 = v4 + (v5 - v4) * f.x;
+  PRECISE real x3 = v6 + (v7 - v6) * f.x;
+  PRECISE real y0 = x0 + (x1 - x0) * f.y;
+  PRECISE real y1 = x2 + (x3 - x2) * f.y;
+  PRECISE real z = y0 + (y1 - y0) * f.z;
+  return z;
+}
+
+#include AMRTEX_ENCODING_FILE
+
+bool region_contains(IN(Region) r, IN(ivec3) cell) {
+  return all(greaterThanEqual(cell, r.lower)) && all(lessThan(cell, r.upper));
+}
+
+// Where a position lies in a region: q, in cell widths of r from its lower corner.
+vec3r region_position(IN(Region) r, IN(Position) p) {
+  ivec3 from_corner = p.cell - r.lower;
+  ivec3 whole = divide_by_width(from_corner, r.width);
+  PRECISE vec3r rest = (vec3r(from_corner - whole * r.width) + p.fraction) / real(r.width);
+  PRECISE vec3r q = vec3r(whole) + rest;
+  return q;
+}
+
+// The field at a position; false where there is no value.
+bool sample_field(IN(Position) p, OUT(FieldSample) s) {
+  Region r;
+  s.value = real(0);
+  s.level = -1;
+  if (!locate(p, r)) return false;
+  s.value = fetch_field(r, region_position(r, p));
+  s.level = r.level;
+  if (AMRTEX_VALIDITY != 0 && is_no_value(s.value)) return false;
+  return true;
+}

@@ -1,0 +1,5 @@
+// One triangle that covers the picture, without vertex buffers.
+void main() {
+  vec2 corner = vec2(float((gl_VertexID << 1) & 2), float(gl_VertexID & 2));
+  gl_Position = vec4(2.0 * corner - vec2(1.0), 0.0, 1.0);
+}

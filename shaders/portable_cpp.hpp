@@ -1,0 +1,150 @@
+// The C++ half of the portable subset: the same shader text becomes the members of a
+// struct template over `real`, its uniforms, textures and buffers bound by name.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <glm/integer.hpp>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "structures/error.hpp"
+#include "structures/host_texture.hpp"
+
+#define AMRTEX_CPP 1
+#define IN(T) const T&
+#define OUT(T) T&
+#define INOUT(T) T&
+#define PRECISE
+#define STRUCT struct
+#define UNIFORM(T, name) \
+  T name{};              \
+  Bound bound_##name{bindings, #name, &(name)};
+#define UNIFORM_ARRAY(T, name, count, most) \
+  T name[most]{};                           \
+  Bound bound_##name{bindings, #name, &(name)[0]};
+#define VALUE_TEXTURE(name)  \
+  ValueTexture<real> name{}; \
+  Bound bound_##name{bindings, #name, &(name)};
+#define INTEGER_TEXTURE(name) \
+  IntegerTexture name{};      \
+  Bound bound_##name{bindings, #name, &(name)};
+#define BUFFER(T, name, block) \
+  HostBuffer<T> name{};        \
+  Bound bound_##name{bindings, #name, &(name)};
+#define DEFINE_INT(name) \
+  int name{};            \
+  Bound bound_##name{bindings, #name, &(name)};
+
+namespace amrtex::portable {
+
+using namespace glm;
+
+class Bindable {
+ public:
+  virtual ~Bindable() = default;
+  virtual void bind(const HostTexture& texture) = 0;
+};
+
+/// texelFetch on a host texture of values: the code (v - a) / b, or v itself.
+template <class real>
+class ValueTexture : public Bindable {
+ public:
+  void bind(const HostTexture& texture) override { texture_ = &texture; }
+  vec<4, real> fetch(const ivec3& texel) const {
+    const HostTexture& t = *texture_;
+    if (any(lessThan(texel, ivec3(0))) || any(greaterThanEqual(texel, t.size)))
+      throw Error("texture " + t.name + ": fetch outside of it");  // never read as 0: it would look like data
+    const auto i = Box{ivec3(0), t.size}.offset(texel);
+    return {static_cast<real>(load_value(t.format, {}, t.data.data(), i)), real(0), real(0), real(1)};
+  }
+
+ private:
+  const HostTexture* texture_ = nullptr;
+};
+
+class IntegerTexture : public Bindable {
+ public:
+  void bind(const HostTexture& texture) override { texture_ = &texture; }
+  uvec4 fetch(const ivec3& texel) const {
+    const HostTexture& t = *texture_;
+    if (any(lessThan(texel, ivec3(0))) || any(greaterThanEqual(texel, t.size)))
+      throw Error("texture " + t.name + ": fetch outside of it");
+    const int components = texel_bytes(t.format) / 4;
+    const auto* data = t.as<std::uint32_t>() + Box{ivec3(0), t.size}.offset(texel) * static_cast<std::size_t>(components);
+    uvec4 v(0, 0, 0, 1);
+    for (int c = 0; c < components; ++c) v[c] = data[c];
+    return v;
+  }
+
+ private:
+  const HostTexture* texture_ = nullptr;
+};
+
+template <class real>
+vec<4, real> texelFetch(const ValueTexture<real>& texture, const ivec3& texel, int /*mip level*/) {
+  return texture.fetch(texel);
+}
+inline uvec4 texelFetch(const IntegerTexture& texture, const ivec3& texel, int /*mip level*/) { return texture.fetch(texel); }
+
+/// A buffer element as the shader's type: uint as is, floats widened to `real`.
+template <class T>
+struct BufferElement {
+  static T read(const std::byte* data, std::size_t i) {
+    T value;
+    __builtin_memcpy(&value, data + i * sizeof(T), sizeof(T));
+    return value;
+  }
+};
+template <>
+struct BufferElement<double> {
+  static double read(const std::byte* data, std::size_t i) { return static_cast<double>(BufferElement<float>::read(data, i)); }
+};
+template <>
+struct BufferElement<dvec2> {
+  static dvec2 read(const std::byte* data, std::size_t i) { return dvec2(BufferElement<vec2>::read(data, i)); }
+};
+template <>
+struct BufferElement<dvec4> {
+  static dvec4 read(const std::byte* data, std::size_t i) { return dvec4(BufferElement<vec4>::read(data, i)); }
+};
+
+template <class T>
+class HostBuffer : public Bindable {
+ public:
+  void bind(const HostTexture& buffer) override { buffer_ = &buffer; }
+  T operator[](std::size_t i) const {
+    if (i >= static_cast<std::size_t>(buffer_->texels())) throw Error("buffer " + buffer_->name + ": read outside of it");
+    return BufferElement<T>::read(buffer_->data.data(), i);
+  }
+  T operator[](int i) const { return (*this)[static_cast<std::size_t>(static_cast<unsigned>(i))]; }
+  T operator[](unsigned i) const { return (*this)[static_cast<std::size_t>(i)]; }
+
+ private:
+  const HostTexture* buffer_ = nullptr;
+};
+
+/// Name -> member, filled by the members' own initialisers.
+struct Bindings {
+  std::map<std::string, int*> ints;
+  std::map<std::string, float*> floats;
+  std::map<std::string, double*> doubles;  ///< scalars and vectors by their first component
+  std::map<std::string, Bindable*> resources;
+};
+
+struct Bound {
+  Bound(Bindings& b, const char* name, int* p) { b.ints[name] = p; }
+  Bound(Bindings& b, const char* name, ivec3* p) { b.ints[name] = &p->x; }
+  Bound(Bindings& b, const char* name, float* p) { b.floats[name] = p; }
+  Bound(Bindings& b, const char* name, vec2* p) { b.floats[name] = &p->x; }
+  Bound(Bindings& b, const char* name, vec3* p) { b.floats[name] = &p->x; }
+  Bound(Bindings& b, const char* name, double* p) { b.doubles[name] = p; }
+  Bound(Bindings& b, const char* name, dvec2* p) { b.doubles[name] = &p->x; }
+  Bound(Bindings& b, const char* name, dvec3* p) { b.doubles[name] = &p->x; }
+  Bound(Bindings& b, const char* name, Bindable* p) { b.resources[name] = p; }
+};
+
+inline float bits_to_float(std::uint32_t bits) { return __builtin_bit_cast(float, bits); }
+
+}  // namespace amrtex::portable

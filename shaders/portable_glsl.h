@@ -1,0 +1,34 @@
+// The GLSL half of the portable subset: one text, compiled for the context and,
+// through portable_cpp.hpp, as C++ in float and double (README.md, "Portable subset").
+#define AMRTEX_CPP 0
+
+#define real float
+#define vec2r vec2
+#define vec3r vec3
+#define vec4r vec4
+#if AMRTEX_RAY_DOUBLE
+#define ray_real double
+#define ray_vec3 dvec3
+#else
+#define ray_real float
+#define ray_vec3 vec3
+#endif
+
+#define IN(T) in T
+#define OUT(T) out T
+#define INOUT(T) inout T
+#define PRECISE precise
+#define STRUCT struct
+
+// declarations that C++ turns into members which are bound by name
+#define UNIFORM(T, name) uniform T name;
+#define VALUE_TEXTURE(name) uniform highp sampler3D name;
+#define INTEGER_TEXTURE(name) uniform highp usampler3D name;
+#define UNIFORM_ARRAY(T, name, count, most) uniform T name[count];
+#define BUFFER(T, name, block) \
+  layout(std430) readonly restrict buffer block { T name[]; };
+#define DEFINE_INT(name)
+
+#define as_real(bits) uintBitsToFloat(bits)
+real no_value() { return uintBitsToFloat(0x7fc00000u); }
+bool is_no_value(real v) { return (floatBitsToUint(v) & 0x7fffffffu) > 0x7f800000u; }

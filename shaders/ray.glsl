@@ -1,0 +1,61 @@
+// Camera rays, clipped to the box that is drawn.
+// Ray space: finest cells along each axis; lengths in units of the smallest edge of a
+// finest cell, so that with cubic cells one unit is one cell.
+UNIFORM(ray_vec3, u_eye)             // finest
+UNIFORM(ray_vec3, u_forward)         // units; see CameraFrame (renderers/scene.hpp)
+UNIFORM(ray_vec3, u_right)           // units
+UNIFORM(ray_vec3, u_up)              // units
+UNIFORM(int, u_orthographic)
+UNIFORM(ray_vec3, u_cells_per_unit)  // finest cells a unit; (1, 1, 1) for cubic cells
+UNIFORM(ray_vec3, u_draw_lower)      // finest: the domain, or the sub-box to draw
+UNIFORM(ray_vec3, u_draw_upper)      // finest
+UNIFORM(vec2r, u_picture_size)       // pixels
+
+STRUCT Ray {
+  ray_vec3 entry;      // finest: where it enters the drawn box, or the eye inside it
+  ray_vec3 direction;  // finest cells a unit of length
+  ray_real length;     // units, from entry to exit
+};
+
+// False when the pixel's ray misses the box. `pixel`: centre, from the lower left.
+bool camera_ray(IN(vec2r) pixel, OUT(Ray) ray) {
+  ray_real u = ray_real(pixel.x) * ray_real(2) / ray_real(u_picture_size.x) - ray_real(1);
+  ray_real v = ray_real(pixel.y) * ray_real(2) / ray_real(u_picture_size.y) - ray_real(1);
+  ray_vec3 offset = u_right * u + u_up * v;
+  ray_vec3 direction = u_forward;
+  ray_vec3 origin = u_eye;
+  if (u_orthographic != 0) origin += offset * u_cells_per_unit;
+  else direction = normalize(u_forward + offset);
+  ray.direction = direction * u_cells_per_unit;
+  ray_real enter = ray_real(0);
+  ray_real leave = ray_real(1e30);
+  ray.entry = origin;
+  ray.length = ray_real(0);
+  for (int axis = 0; axis < 3; ++axis) {
+    ray_real o = origin[axis];
+    ray_real d = ray.direction[axis];
+    if (d == ray_real(0)) {  // parallel to these faces: inside all the way, or never
+      if (o < u_draw_lower[axis] || o > u_draw_upper[axis]) return false;
+    } else {
+      ray_real t0 = (u_draw_lower[axis] - o) / d;
+      ray_real t1 = (u_draw_upper[axis] - o) / d;
+      enter = max(enter, min(t0, t1));
+      leave = min(leave, max(t0, t1));
+    }
+  }
+  if (!(leave > enter)) return false;
+  ray.entry = clamp(origin + ray.direction * enter, u_draw_lower, u_draw_upper);
+  ray.length = leave - enter;
+  return true;
+}
+
+// Splits a point in finest space; faces belong to the upper cell, the domain's last face
+// to its last cell.
+Position make_position(IN(ray_vec3) p) {
+  Position position;
+  ray_vec3 last = ray_vec3(u_domain_cells - ivec3(1));
+  ray_vec3 whole = clamp(floor(p), ray_vec3(0), last);
+  position.cell = ivec3(whole);
+  position.fraction = clamp(vec3r(p - whole), vec3r(0), vec3r(0.99999994));
+  return position;
+}

@@ -1,0 +1,23 @@
+// Entry point of the raycaster: one ray a pixel through the contract.
+#include "portable_glsl.h"
+#include "contract.glsl"
+#include "ray.glsl"
+#include "transfer_function.glsl"
+#include "march.glsl"
+
+layout(location = 0) out vec4 out_color;
+#if AMRTEX_COUNT
+layout(location = 1) out uvec4 out_counted;
+#endif
+
+void main() {
+  Accumulation a = empty_accumulation();
+  Ray ray;
+  vec4 color = vec4(0);
+  if (camera_ray(gl_FragCoord.xy, ray)) color = march_ray(ray, a);
+  else if (AMRTEX_MODE != AMRTEX_MODE_DVR) color.w = 1.0;
+  out_color = color;
+#if AMRTEX_COUNT
+  out_counted = uvec4(uvec3(a.counted), color == vec4(0) && a.counted.y == 0 ? 0u : 1u);
+#endif
+}

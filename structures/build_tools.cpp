@@ -1,0 +1,104 @@
+#include "build_tools.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace amrtex {
+
+void ValueRange::add(double value) {
+  if (std::isnan(value)) return;
+  if (empty()) {
+    min = max = value;
+  } else {
+    min = std::min(min, value);
+    max = std::max(max, value);
+  }
+}
+
+void store_range(ValueRange range, Storage storage, StorageScale scale, float* out) {
+  if (range.empty()) {
+    out[0] = 1;
+    out[1] = -1;
+    return;
+  }
+  // what the shader decodes may lie half a code away, and one rounding further
+  double slack = 0;
+  if (storage == Storage::r8) slack = scale.scale * (0.51 / 255);
+  if (storage == Storage::r16) slack = scale.scale * (0.51 / 65535);
+  if (storage == Storage::r16f) slack = scale.scale * std::ldexp(1.0, -11);
+  slack += 4e-7 * std::max({std::abs(range.min), std::abs(range.max), storage == Storage::r32f ? 0.0 : std::abs(scale.scale)});
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const bool exact = storage == Storage::r32f && range.min == range.max && static_cast<double>(static_cast<float>(range.min)) == range.min;
+  out[0] = exact ? static_cast<float>(range.min) : std::nextafter(static_cast<float>(range.min - slack), -kInfinity);
+  out[1] = exact ? static_cast<float>(range.max) : std::nextafter(static_cast<float>(range.max + slack), kInfinity);
+}
+
+void store_values(Storage storage, StorageScale scale, const double* values, std::size_t count, std::byte* data, std::size_t first) {
+  if (storage == Storage::r32f) {
+    auto* out = reinterpret_cast<float*>(data) + first;
+    for (std::size_t i = 0; i < count; ++i) out[i] = std::isnan(values[i]) ? 0.0F : static_cast<float>(values[i]);
+    return;
+  }
+  for (std::size_t i = 0; i < count; ++i)
+    store_value(storage, scale, std::isnan(values[i]) ? scale.offset : values[i], data, first + i);
+}
+
+HostTexture make_texture(std::string name, TexelFormat format, const Vec3i& size) {
+  HostTexture t;
+  t.name = std::move(name);
+  t.kind = HostTexture::Kind::texture_3d;
+  t.format = format;
+  t.size = size;
+  t.data.resize(static_cast<std::size_t>(t.bytes()));
+  return t;
+}
+
+HostTexture make_buffer(std::string name, TexelFormat format, std::int64_t elements) {
+  HostTexture t = make_texture(std::move(name), format, {static_cast<int>(std::max<std::int64_t>(elements, 1)), 1, 1});
+  t.kind = HostTexture::Kind::buffer;
+  t.roles.topology = t.bytes();
+  return t;
+}
+
+bool power_of_two_ratios(const AmrHierarchy& hierarchy) {
+  for (int l = 0; l < hierarchy.finest_level(); ++l) {
+    const int r = hierarchy.ratio_to_finer(l);
+    if ((r & (r - 1)) != 0) return false;
+  }
+  return true;
+}
+
+EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request, const Json& parameters) {
+  EncodedField field;
+  const bool linear = request.needs.filter != Filter::nearest;
+  field.encoding = encoding.name();
+  field.build_parameters = parameters;
+  field.definition.filter = request.needs.filter;
+  field.filtering = linear && request.storage != Storage::r64f ? request.needs.filtering : Filtering::manual;
+  field.storage = request.storage;
+  const FieldStatistics& s = hierarchy.statistics(request.field);
+  field.scale = storage_scale(request.storage, s.min, s.max);
+  const bool validity = hierarchy.has_missing(request.field);
+  const bool scaled = request.storage != Storage::r32f && request.storage != Storage::r64f;
+  field.shader.file = fmt::format("{0}/{0}.glsl", encoding.name());
+  field.shader.defines = {{"AMRTEX_FILTER", static_cast<int>(request.needs.filter)},
+                          {"AMRTEX_HARDWARE_FILTERING", field.filtering == Filtering::hardware ? 1 : 0},
+                          {"AMRTEX_POWER_OF_TWO", power_of_two_ratios(hierarchy) ? 1 : 0},
+                          {"AMRTEX_LEVELS", hierarchy.level_count()},
+                          {"AMRTEX_VALIDITY", validity ? 1 : 0},
+                          {"AMRTEX_VALUE_RANGES", request.needs.value_ranges ? 1 : 0},
+                          {"AMRTEX_SCALED_STORAGE", scaled ? 1 : 0}};
+  return field;
+}
+
+int integer_parameter(const Encoding& encoding, const Json& parameters, std::string_view name) {
+  const Json& value = parameters.at(std::string(name));
+  if (value.is_number_integer()) return value.get<int>();
+  for (const ParameterInfo& p : encoding.parameters())
+    if (p.name == name)
+      throw UsageError(fmt::format("encoding {}: parameter {} is {}; accepted: {}", encoding.name(), name, value.dump(), p.accepted));
+  throw UsageError(fmt::format("encoding {}: parameter {} is {}", encoding.name(), name, value.dump()));
+}
+
+}  // namespace amrtex

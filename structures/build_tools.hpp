@@ -1,0 +1,45 @@
+// What builders of encodings share: storing blocks of values, validity bits, ranges.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "encoding.hpp"
+
+namespace amrtex {
+
+/// Minimum and maximum of values; NaN is left out; minimum > maximum when none is left.
+struct ValueRange {
+  double min = 1;
+  double max = -1;
+  bool empty() const { return min > max; }
+  void add(double value);
+  bool operator==(const ValueRange&) const = default;
+};
+
+/// The range as two floats, rounded outwards, after the values were stored with the given
+/// format: what skipping may rely on.
+void store_range(ValueRange range, Storage storage, StorageScale scale, float* out);
+
+/// Stores `count` values side by side from texel `first`; NaN is stored as 0.
+void store_values(Storage storage, StorageScale scale, const double* values, std::size_t count, std::byte* data, std::size_t first);
+
+/// An allocated, zeroed texture or buffer.
+HostTexture make_texture(std::string name, TexelFormat format, const Vec3i& size);
+HostTexture make_buffer(std::string name, TexelFormat format, std::int64_t elements);
+
+/// Words of 32 bits for `bits` bits.
+constexpr std::int64_t words_for_bits(std::int64_t bits) { return (bits + 31) / 32; }
+inline void set_bit(std::uint32_t* words, std::int64_t bit) { words[bit / 32] |= 1U << (bit % 32); }
+
+/// Does every refinement ratio equal a power of two?
+bool power_of_two_ratios(const AmrHierarchy& hierarchy);
+
+/// Fields of EncodedField that are filled in the same way for every encoding.
+EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request, const Json& parameters);
+
+/// Reads an integer parameter. Throws UsageError naming what is accepted.
+int integer_parameter(const Encoding& encoding, const Json& parameters, std::string_view name);
+
+}  // namespace amrtex

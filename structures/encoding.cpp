@@ -1,0 +1,126 @@
+#include "encoding.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <xxhash.h>
+
+#include <algorithm>
+
+namespace amrtex {
+namespace {
+
+constexpr std::array<Filter, 5> kFilters{Filter::nearest, Filter::linear_lod, Filter::linear_page, Filter::linear_vertex, Filter::basis};
+
+template <class Range, class Name>
+std::string join_names(const Range& range, Name&& name) {
+  std::vector<std::string> names;
+  for (const auto& item : range) names.emplace_back(name(item));
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+}  // namespace
+
+std::string_view filter_name(Filter filter) {
+  switch (filter) {
+    case Filter::nearest: return "nearest";
+    case Filter::linear_lod: return "linear_lod";
+    case Filter::linear_page: return "linear_page";
+    case Filter::linear_vertex: return "linear_vertex";
+    case Filter::basis: return "basis";
+  }
+  return "";
+}
+
+std::span<const Filter> all_filters() { return kFilters; }
+
+Filter parse_filter(std::string_view name) {
+  for (Filter f : kFilters)
+    if (filter_name(f) == name) return f;
+  throw UsageError(fmt::format("no filter '{}'; accepted: {}", name, join_names(kFilters, filter_name)));
+}
+
+std::string_view filtering_name(Filtering filtering) { return filtering == Filtering::hardware ? "hardware" : "manual"; }
+
+Filtering parse_filtering(std::string_view name) {
+  for (Filtering f : {Filtering::hardware, Filtering::manual})
+    if (filtering_name(f) == name) return f;
+  throw UsageError(fmt::format("no filtering '{}'; accepted: hardware, manual", name));
+}
+
+MemoryByRole EncodedField::memory() const {
+  MemoryByRole sum;
+  for (const HostTexture& t : textures) sum += t.roles;
+  return sum;
+}
+
+std::int64_t EncodedField::value_texels() const {
+  std::int64_t n = 0;
+  for (const HostTexture& t : textures)
+    if (t.holds_values) n += t.texels();
+  return n;
+}
+
+std::string EncodedField::content_hash() const {
+  XXH3_state_t* state = XXH3_createState();
+  XXH3_128bits_reset(state);
+  const auto add = [&](const void* bytes, std::size_t n) { XXH3_128bits_update(state, bytes, n); };
+  const auto add_text = [&](std::string_view text) { add(text.data(), text.size() + 0); };
+  add_text(shader.file);
+  for (const auto& [name, value] : shader.defines) {
+    add_text(name);
+    add(&value, sizeof value);
+  }
+  for (const auto& [name, value] : integer_uniforms) {
+    add_text(name);
+    add(&value, sizeof value);
+  }
+  for (const HostTexture& t : textures) {
+    add_text(t.name);
+    add_text(format_name(t.format));
+    add(&t.size, sizeof t.size);
+    add(t.data.data(), t.data.size());
+  }
+  const XXH128_hash_t h = XXH3_128bits_digest(state);
+  XXH3_freeState(state);
+  return fmt::format("{:016x}{:016x}", h.high64, h.low64);
+}
+
+const HostTexture* EncodedField::find(std::string_view name) const {
+  for (const HostTexture& t : textures)
+    if (t.name == name) return &t;
+  return nullptr;
+}
+
+const Encoding& find_encoding(std::string_view name) {
+  for (const Encoding* e : all_encodings())
+    if (e->name() == name) return *e;
+  throw UsageError(fmt::format("no encoding '{}'; accepted: {}", name,
+                               join_names(all_encodings(), [](const Encoding* e) { return e->name(); })));
+}
+
+Json complete_parameters(const Encoding& encoding, const Json& given) {
+  const std::vector<ParameterInfo> known = encoding.parameters();
+  for (const auto& [key, value] : given.items())
+    if (std::none_of(known.begin(), known.end(), [&](const ParameterInfo& p) { return p.name == key; }))
+      throw UsageError(fmt::format("encoding {}: no parameter '{}'; accepted: {}", encoding.name(), key,
+                                   known.empty() ? "none" : join_names(known, [](const ParameterInfo& p) { return p.name; })));
+  Json complete = Json::object();
+  for (const ParameterInfo& p : known) complete[p.name] = given.contains(p.name) ? given[p.name] : p.default_value;
+  return complete;
+}
+
+void require_filter(const Encoding& encoding, Filter filter) {
+  const auto has = encoding.filters();
+  if (std::find(has.begin(), has.end(), filter) == has.end())
+    throw UnsupportedError(
+        fmt::format("encoding {}: no filter {}; it has {}", encoding.name(), filter_name(filter), join_names(has, filter_name)));
+}
+
+void require_budget(const Encoding& encoding, std::int64_t bytes, const BuildRequest& request) {
+  if (bytes > request.memory_limit)
+    throw BudgetError(fmt::format("encoding {} with {}: needs {} bytes ({:.1f} MiB), the memory limit is {} bytes ({:.1f} MiB)", encoding.name(),
+                                  request.parameters.dump(), bytes, static_cast<double>(bytes) / 1048576.0, request.memory_limit,
+                                  static_cast<double>(request.memory_limit) / 1048576.0));
+}
+
+}  // namespace amrtex

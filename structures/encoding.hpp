@@ -1,0 +1,138 @@
+// The C++ side of the sampler contract: what an encoding is to everybody else.
+#pragma once
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "amr_hierarchy.hpp"
+#include "host_texture.hpp"
+
+namespace amrtex {
+
+using Json = nlohmann::ordered_json;
+
+/// The field that is reconstructed from the leaf cells (shaders/README.md).
+enum class Filter { nearest, linear_lod, linear_page, linear_vertex, basis };
+std::string_view filter_name(Filter filter);
+/// Throws a UsageError that names all filters.
+Filter parse_filter(std::string_view name);
+std::span<const Filter> all_filters();
+
+/// Which field f(p) exactly: the filter and, for `linear_page`, its pages.
+struct FilterDefinition {
+  Filter filter = Filter::nearest;
+  int page_size = 0;  ///< cells along an edge of a page; 0 = the whole domain is one page
+  int page_level = 0;  ///< level of that one page (page_size 0 only)
+  bool operator==(const FilterDefinition&) const = default;
+};
+
+/// Who does the linear interpolation: the texture unit or the shader.
+enum class Filtering { hardware, manual };
+std::string_view filtering_name(Filtering filtering);
+Filtering parse_filtering(std::string_view name);
+
+/// What a GL context offers, as far as encodings care. The defaults are "no limit known".
+struct ContextInfo {
+  std::string renderer, version, vendor;
+  int max_3d_texture_size = 2048;                     ///< texels along an axis
+  std::int64_t max_buffer_bytes = std::int64_t{1} << 27;  ///< of one shader storage block
+  bool bindless_texture = false;
+  std::vector<std::string> extensions;
+};
+
+struct Support {
+  bool ok = true;
+  std::string reason;  ///< why not
+};
+
+/// The one switch for what builders and shaders leave out (computed from the scene).
+struct SceneNeeds {
+  Filter filter = Filter::nearest;
+  Filtering filtering = Filtering::manual;
+  bool value_ranges = true;  ///< regions are skipped by their value range
+};
+
+struct LeftOut {
+  std::string what, why;
+  std::int64_t bytes = 0;
+};
+
+/// A build parameter: what the command line and experiment files may say.
+struct ParameterInfo {
+  std::string name;
+  std::string description;  ///< with its unit
+  Json default_value;
+  std::string accepted;     ///< for error messages: "an integer from 4 to 128"
+};
+
+/// The shader's view of one built field: the file with its locate() and
+/// fetch_field(), and every define that the file requires.
+struct ShaderPart {
+  std::string file;                                        ///< as known to the shader library, "page_table/page_table.glsl"
+  std::vector<std::pair<std::string, int>> defines;        ///< name, value
+};
+
+/// Built data: plain, independent of GL and of any consumer.
+struct EncodedField {
+  std::string encoding;
+  Json build_parameters;                 ///< complete, with defaults filled in
+  FilterDefinition definition;           ///< the mathematics that this field reproduces
+  Filtering filtering = Filtering::manual;
+  Storage storage = Storage::r32f;
+  StorageScale scale;
+  ShaderPart shader;
+  std::vector<HostTexture> textures;
+  std::vector<std::pair<std::string, Vec3i>> integer_uniforms;  ///< ivec3 uniforms of the encoding's GLSL
+  std::vector<LeftOut> left_out;
+  Json statistics;                       ///< counts of the structure: pages, nodes, fill, ...
+  std::int64_t host_peak_bytes = 0;      ///< arrays that the build itself allocated at once, the result included
+
+  MemoryByRole memory() const;
+  /// Texels of the textures that hold values.
+  std::int64_t value_texels() const;
+  /// Hash over names, formats, sizes and contents of everything the shader reads.
+  std::string content_hash() const;
+  const HostTexture* find(std::string_view name) const;
+};
+
+struct BuildRequest {
+  int field = 0;
+  Storage storage = Storage::r32f;
+  SceneNeeds needs;
+  Json parameters = Json::object();   ///< unknown keys are an error
+  ContextInfo context;                ///< limits to keep
+  std::int64_t memory_limit = std::numeric_limits<std::int64_t>::max();  ///< bytes of all textures and buffers
+};
+
+/// One GPU data structure for an AMR field. Stateless; one object a registry line.
+class Encoding {
+ public:
+  virtual ~Encoding() = default;
+  virtual std::string_view name() const = 0;
+  /// The filters of this encoding under some parameters (for tables and messages).
+  virtual std::span<const Filter> filters() const = 0;
+  virtual std::vector<ParameterInfo> parameters() const = 0;
+  virtual Support supported(const ContextInfo& context) const = 0;
+  /// Builds the field. Throws UsageError for a bad parameter, UnsupportedError for
+  /// a filter or a size that this encoding cannot take (naming what it can), and
+  /// BudgetError before allocation when the result would pass the limits.
+  virtual EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const = 0;
+};
+
+/// All encodings, in the order of the lines in structures/CMakeLists.txt.
+std::span<const Encoding* const> all_encodings();
+/// Throws a UsageError that names the known ones.
+const Encoding& find_encoding(std::string_view name);
+
+/// Checks keys against `parameters()` and fills in defaults. Throws UsageError.
+Json complete_parameters(const Encoding& encoding, const Json& given);
+/// Throws UnsupportedError naming the filters that the encoding has.
+void require_filter(const Encoding& encoding, Filter filter);
+/// Throws BudgetError with the bytes needed when `bytes` passes the limit.
+void require_budget(const Encoding& encoding, std::int64_t bytes, const BuildRequest& request);
+
+}  // namespace amrtex

@@ -1,0 +1,119 @@
+// page_table: one or two table look-ups a region, one filtered fetch a sample.
+#include "page_table/page_table_layout.h"
+#if !AMRTEX_CPP
+#ifndef AMRTEX_PAGE_SIZE
+#error AMRTEX_PAGE_SIZE must be defined: cells along the edge of a page, a power of two
+#endif
+#ifndef AMRTEX_PAGE_BORDER
+#error AMRTEX_PAGE_BORDER must be defined: texels between the lower face of a page and its first value
+#endif
+#ifndef AMRTEX_PAGE_EDGE
+#error AMRTEX_PAGE_EDGE must be defined: texels along the edge of a stored page
+#endif
+#ifndef AMRTEX_PAGE_NODES
+#error AMRTEX_PAGE_NODES must be defined: 1 where texels are vertices, 0 where they are cells
+#endif
+#ifndef AMRTEX_PAGE_CONSTANTS
+#error AMRTEX_PAGE_CONSTANTS must be defined: 1 where constant pages exist, else 0
+#endif
+#ifndef AMRTEX_PAGE_TABLE_LEVELS
+#error AMRTEX_PAGE_TABLE_LEVELS must be defined: 1 or 2
+#endif
+#endif
+DEFINE_INT(AMRTEX_PAGE_SIZE)
+DEFINE_INT(AMRTEX_PAGE_BORDER)
+DEFINE_INT(AMRTEX_PAGE_EDGE)
+DEFINE_INT(AMRTEX_PAGE_NODES)
+DEFINE_INT(AMRTEX_PAGE_CONSTANTS)
+DEFINE_INT(AMRTEX_PAGE_TABLE_LEVELS)
+
+INTEGER_TEXTURE(tex_page_table)
+#if AMRTEX_CPP || AMRTEX_PAGE_TABLE_LEVELS == 2
+INTEGER_TEXTURE(tex_page_subtables)
+UNIFORM(ivec3, u_subtable)        // x: entries along an edge; y: width of an entry, finest cells; z: unused
+UNIFORM(ivec3, u_subtable_shift)  // log2 of sub-tables along x and y of their texture
+#endif
+VALUE_TEXTURE(tex_pages)
+UNIFORM(ivec3, u_page_table)     // x: width of a table entry, finest cells
+UNIFORM(ivec3, u_pool_shift)     // log2 of pages along x and y of the pool
+UNIFORM(ivec3, u_pool_texels)    // size of the pool
+#if AMRTEX_CPP || AMRTEX_VALIDITY
+BUFFER(uint, page_validity, page_validity_block)  // one bit a cell, each page from a new word
+#endif
+#if AMRTEX_CPP || AMRTEX_VALUE_RANGES
+BUFFER(vec2r, page_ranges, page_ranges_block)  // minimum and maximum a page, border included
+#endif
+
+// Position of block `index` in a texture that holds 2^shift.x by 2^shift.y by n blocks.
+ivec3 page_pool_position(IN(int) index, IN(ivec3) shift) {
+  return ivec3(index & ((1 << shift.x) - 1), (index >> shift.x) & ((1 << shift.y) - 1), index >> (shift.x + shift.y));
+}
+
+bool locate(IN(Position) p, OUT(Region) r) {
+  ivec3 t = divide_by_width(p.cell, u_page_table.x);
+  uvec4 entry = texelFetch(tex_page_table, t, 0);
+  int kind = int(entry.y >> uint(AMRTEX_PAGE_KIND_SHIFT));
+#if AMRTEX_CPP || AMRTEX_PAGE_TABLE_LEVELS == 2
+  if (AMRTEX_PAGE_TABLE_LEVELS == 2 && kind == AMRTEX_PAGE_SUBTABLE) {
+    ivec3 s = divide_by_width(p.cell - t * u_page_table.x, u_subtable.y);
+    entry = texelFetch(tex_page_subtables, page_pool_position(int(entry.x), u_subtable_shift) * u_subtable.x + s, 0);
+    kind = int(entry.y >> uint(AMRTEX_PAGE_KIND_SHIFT));
+  }
+#endif
+  r.level = int(entry.y & uint(AMRTEX_PAGE_LEVEL_MASK));
+  r.width = u_level_width[r.level];
+  int page_width = AMRTEX_PAGE_SIZE * r.width;
+  r.lower = divide_by_width(p.cell, page_width) * page_width;
+  r.upper = min(r.lower + ivec3(page_width), u_domain_cells);
+  r.value_range = vec2r(0);
+  int index = int(entry.x);
+  ivec3 texel = page_pool_position(index, u_pool_shift) * AMRTEX_PAGE_EDGE;
+  r.handle = ivec4(texel.x, texel.y, texel.z, index);
+  if (AMRTEX_PAGE_CONSTANTS != 0 && kind == AMRTEX_PAGE_CONSTANT) {
+    r.handle = ivec4(0, 0, index, -1);
+    r.value_range = vec2r(as_real(entry.x));
+  }
+#if AMRTEX_CPP || AMRTEX_VALUE_RANGES
+  if (AMRTEX_VALUE_RANGES != 0 && kind == AMRTEX_PAGE_STORED) r.value_range = page_ranges[index];
+#endif
+  return kind != AMRTEX_PAGE_ABSENT;
+}
+
+#if AMRTEX_CPP || AMRTEX_VALIDITY
+bool page_has_value(IN(Region) r, IN(ivec3) cell) {
+  if (r.handle.w < 0) return true;
+  ivec3 c = clamp(cell, ivec3(0), ivec3(AMRTEX_PAGE_SIZE - 1));
+  int bit = c.x + AMRTEX_PAGE_SIZE * (c.y + AMRTEX_PAGE_SIZE * c.z);
+  int words = AMRTEX_PAGE_SIZE * AMRTEX_PAGE_SIZE * AMRTEX_PAGE_SIZE / 32;
+  return ((page_validity[r.handle.w * words + (bit >> 5)] >> uint(bit & 31)) & 1u) != 0u;
+}
+#endif
+
+real page_texel(IN(ivec3) texel) { return texelFetch(tex_pages, texel, 0).x; }
+
+real page_stored_value(IN(Region) r, IN(vec3r) q) {
+  ivec3 page = ivec3(r.handle.x, r.handle.y, r.handle.z);
+  if (AMRTEX_FILTER == AMRTEX_FILTER_NEAREST)
+    return decode_value(page_texel(page + clamp(ivec3(floor(q)), ivec3(0), ivec3(AMRTEX_PAGE_SIZE - 1)) + AMRTEX_PAGE_BORDER));
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+  // a cell's centre is its texel's; a vertex sits on the corner, half a texel from its own
+  vec3r texel = vec3r(page) + (AMRTEX_PAGE_NODES != 0 ? vec3r(0.5) : vec3r(AMRTEX_PAGE_BORDER)) + q;
+  return decode_value(textureLod(tex_pages, texel / vec3r(u_pool_texels), 0.0).x);
+#else
+  PRECISE vec3r from_first = AMRTEX_PAGE_NODES != 0 ? q : q + vec3r(real(AMRTEX_PAGE_BORDER) - real(0.5));
+  vec3r whole = clamp(floor(from_first), vec3r(0), vec3r(AMRTEX_PAGE_EDGE - 2));
+  vec3r f = from_first - whole;
+  ivec3 i = page + ivec3(whole);
+  return decode_value(trilinear(page_texel(i), page_texel(i + ivec3(1, 0, 0)), page_texel(i + ivec3(0, 1, 0)), page_texel(i + ivec3(1, 1, 0)),
+                                page_texel(i + ivec3(0, 0, 1)), page_texel(i + ivec3(1, 0, 1)), page_texel(i + ivec3(0, 1, 1)),
+                                page_texel(i + ivec3(1, 1, 1)), f));
+#endif
+}
+
+real fetch_field(IN(Region) r, IN(vec3r) q) {
+#if AMRTEX_CPP || AMRTEX_VALIDITY
+  if (AMRTEX_VALIDITY != 0 && !page_has_value(r, ivec3(floor(q)))) return no_value();
+#endif
+  if (AMRTEX_PAGE_CONSTANTS != 0 && r.handle.w < 0) return as_real(uint(r.handle.z));
+  return page_stored_value(r, q);
+}

@@ -1,0 +1,69 @@
+// uniform: locate() is arithmetic, fetch_field() one fetch of the dense texture.
+#include "uniform/uniform_layout.h"
+#if !AMRTEX_CPP
+#ifndef AMRTEX_DENSE_LEVEL
+#error AMRTEX_DENSE_LEVEL must be defined: the level that the texture holds
+#endif
+#endif
+DEFINE_INT(AMRTEX_DENSE_LEVEL)
+
+VALUE_TEXTURE(tex_dense)
+UNIFORM(ivec3, u_dense_cells)   // cells of the level
+UNIFORM(ivec3, u_dense_blocks)  // regions along each axis
+#if AMRTEX_CPP || AMRTEX_VALIDITY
+BUFFER(uint, dense_validity, dense_validity_block)  // one bit a cell, x fastest
+#endif
+#if AMRTEX_CPP || AMRTEX_VALUE_RANGES
+BUFFER(vec2r, dense_ranges, dense_ranges_block)  // minimum and maximum a block; minimum > maximum: no mesh
+#endif
+
+bool locate(IN(Position) p, OUT(Region) r) {
+  r.level = AMRTEX_DENSE_LEVEL;
+  r.width = u_level_width[AMRTEX_DENSE_LEVEL];
+  r.lower = ivec3(0);
+  r.upper = u_domain_cells;
+  r.value_range = vec2r(0);
+  r.handle = ivec4(0);
+#if AMRTEX_CPP || AMRTEX_VALUE_RANGES
+  if (AMRTEX_VALUE_RANGES != 0) {
+    ivec3 block = divide_by_width(p.cell, r.width) / AMRTEX_DENSE_BLOCK;
+    int block_width = AMRTEX_DENSE_BLOCK * r.width;
+    r.lower = block * block_width;
+    r.upper = min(r.lower + ivec3(block_width), u_domain_cells);
+    ivec3 first = block * AMRTEX_DENSE_BLOCK;
+    r.handle = ivec4(first.x, first.y, first.z, 0);
+    r.value_range = dense_ranges[block.x + u_dense_blocks.x * (block.y + u_dense_blocks.y * block.z)];
+    return r.value_range.x <= r.value_range.y;
+  }
+#endif
+  return true;
+}
+
+real dense_texel(IN(ivec3) cell) { return texelFetch(tex_dense, clamp(cell, ivec3(0), u_dense_cells - ivec3(1)), 0).x; }
+
+#if AMRTEX_CPP || AMRTEX_VALIDITY
+bool dense_has_value(IN(ivec3) cell) {
+  ivec3 c = clamp(cell, ivec3(0), u_dense_cells - ivec3(1));
+  uint bit = uint(c.x) + uint(u_dense_cells.x) * (uint(c.y) + uint(u_dense_cells.y) * uint(c.z));
+  return ((dense_validity[bit >> 5u] >> (bit & 31u)) & 1u) != 0u;
+}
+#endif
+
+real fetch_field(IN(Region) r, IN(vec3r) q) {
+  ivec3 first = ivec3(r.handle.x, r.handle.y, r.handle.z);
+#if AMRTEX_CPP || AMRTEX_VALIDITY
+  if (AMRTEX_VALIDITY != 0 && !dense_has_value(first + ivec3(floor(q)))) return no_value();
+#endif
+  if (AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) return decode_value(dense_texel(first + ivec3(floor(q))));
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+  return decode_value(textureLod(tex_dense, (vec3r(first) + q) / vec3r(u_dense_cells), 0.0).x);
+#else
+  PRECISE vec3r from_centre = q - vec3r(0.5);
+  vec3r whole = floor(from_centre);
+  vec3r f = from_centre - whole;
+  ivec3 i = first + ivec3(whole);
+  return decode_value(trilinear(dense_texel(i), dense_texel(i + ivec3(1, 0, 0)), dense_texel(i + ivec3(0, 1, 0)),
+                                dense_texel(i + ivec3(1, 1, 0)), dense_texel(i + ivec3(0, 0, 1)), dense_texel(i + ivec3(1, 0, 1)),
+                                dense_texel(i + ivec3(0, 1, 1)), dense_texel(i + ivec3(1, 1, 1)), f));
+#endif
+}

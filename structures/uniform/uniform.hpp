@@ -1,0 +1,12 @@
+#pragma once
+
+#include <memory>
+
+#include "structures/encoding.hpp"
+
+namespace amrtex {
+
+/// The dense baseline: one 3D texture of a whole level (README.md).
+std::unique_ptr<Encoding> make_uniform();
+
+}  // namespace amrtex

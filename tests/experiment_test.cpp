@@ -1,0 +1,440 @@
+#include "bench/experiment.hpp"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <set>
+
+#include "bench/json_file.hpp"
+#include "bench/record.hpp"
+#include "structures/error.hpp"
+
+namespace amrtex {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+constexpr const char* kSmall = R"({
+  "name": "small",
+  "datasets": [{"generate": {"field": "blobs_shell", "levels": 2}}],
+  "encodings": [{"name": "uniform"}],
+  "filters": ["nearest"],
+  "render": {"mode": "dvr", "step": 1},
+  "views": [{"eye": [3, 0, 0], "at": [0, 0, 0], "up": [0, 0, 1], "fov_y": 35}],
+  "transfer_function": {"extinction": [[0, 0], [1, 5]], "color": [[0, 1, 1, 1]]}
+})";
+
+/// kSmall with one key replaced, or added.
+std::string with(const std::string& key, const std::string& value) {
+  Json json = Json::parse(kSmall);
+  json[key] = Json::parse(value);
+  return json.dump(1);
+}
+
+std::string without(const std::string& key) {
+  Json json = Json::parse(kSmall);
+  json.erase(key);
+  return json.dump(1);
+}
+
+Experiment parsed(const std::string& text) { return parse_experiment(text, "folder/e.json"); }
+
+std::string complaint(const std::string& text) {
+  try {
+    parsed(text);
+  } catch (const UsageError& e) {
+    return e.what();
+  }
+  return "accepted";
+}
+
+std::string scene_complaint(const std::string& text) {
+  try {
+    parse_scene(text, "s.json");
+  } catch (const UsageError& e) {
+    return e.what();
+  }
+  return "accepted";
+}
+
+/// "encoding page_size filter filtering storage" of every build, to read in one glance.
+std::vector<std::string> build_texts(const Experiment& experiment) {
+  std::vector<std::string> texts;
+  for (const BuildPoint& b : experiment.builds) {
+    const std::string size = b.parameters.contains("page_size") ? b.parameters["page_size"].dump() : "-";
+    texts.push_back(fmt::format("{} {} {} {} {}", b.encoding, size, filter_name(b.filter), filtering_name(b.filtering),
+                                format_name(b.storage)));
+  }
+  return texts;
+}
+
+// --- what is accepted ---
+
+TEST(Experiment, OfOnePointHasTheDefaultsOfTheDocumentation) {
+  const Experiment e = parsed(kSmall);
+  EXPECT_EQ(e.name, "small");
+  ASSERT_EQ(e.points(), 1u);
+  EXPECT_EQ(e.datasets[0].name, "blobs_shell");
+  EXPECT_EQ(e.datasets[0].generate["levels"], 2);
+  EXPECT_EQ(e.renders[0].frames, 9);
+  EXPECT_EQ(e.renders[0].warm_up, 2);
+  EXPECT_EQ(e.renders[0].consumer, "raycast");
+  EXPECT_EQ(e.renders[0].settings.width, 512);
+  EXPECT_TRUE(e.renders[0].settings.skip);
+  EXPECT_FALSE(e.renders[0].settings.early_end);
+  EXPECT_EQ(e.seed, 1u);
+  EXPECT_EQ(e.context, "egl");
+  ASSERT_TRUE(e.reference);
+  EXPECT_EQ(e.reference->step, 0.0625);
+  EXPECT_EQ(e.reference->common_filter, Filter::linear_vertex);
+  EXPECT_FALSE(e.memory_limit);
+  EXPECT_FALSE(e.minimum_psnr_db);
+  EXPECT_TRUE(e.axes.empty());
+}
+
+TEST(Experiment, EveryEncodingHasItsOwnBuildAxes) {
+  const Experiment e = parsed(with("encodings", R"([{"name": "uniform"}, {"name": "page_table", "page_size": [4, 8]}])"));
+  EXPECT_THAT(build_texts(e), ElementsAre("uniform - nearest manual r32f", "page_table 4 nearest manual r32f",
+                                          "page_table 8 nearest manual r32f"));
+  EXPECT_THAT(e.axes, ElementsAre("encodings", "encodings[1].page_size"));
+}
+
+TEST(Experiment, AValueAndAListOfOneAreTheSame) {
+  Json json = Json::parse(with("encodings", R"({"name": "page_table", "page_size": 4})"));
+  json["filters"] = "nearest";
+  json["datasets"] = json["datasets"][0];
+  json["views"] = json["views"][0];
+  EXPECT_THAT(build_texts(parsed(json.dump())), ElementsAre("page_table 4 nearest manual r32f"));
+}
+
+TEST(Experiment, NearestIgnoresFilteringAndIsNotBuiltTwice) {
+  Json json = Json::parse(with("filters", R"(["nearest", "linear_page"])"));
+  json["filtering"] = {"hardware", "manual"};
+  EXPECT_THAT(
+      build_texts(parsed(json.dump())),
+      ElementsAre("uniform - nearest manual r32f", "uniform - linear_page hardware r32f", "uniform - linear_page manual r32f"));
+}
+
+TEST(Experiment, ADefaultGivenByNameIsNotBuiltTwice) {
+  const Experiment e = parsed(with("encodings", R"([{"name": "page_table"}, {"name": "page_table", "page_size": [16, 32]}])"));
+  EXPECT_EQ(e.builds.size(), 2u);
+}
+
+TEST(Experiment, AFilterThatAnEncodingLacksIsAPointAndNoMistake) {
+  EXPECT_EQ(parsed(with("filters", R"(["basis"])")).points(), 1u);
+}
+
+TEST(Experiment, RenderAxesViewsAndTransferFunctionsMultiply) {
+  Json json = Json::parse(with("render", R"({"mode": ["dvr"], "sampling": ["lattice", "adaptive"], "step": [1, 0.5, 0.25]})"));
+  json["views"].push_back(json["views"][0]);
+  json["views"][1]["eye"] = {0, 3, 0};
+  json["views"][1]["name"] = "side";
+  const Json first = json["transfer_function"];
+  json["transfer_function"] = Json::array({first, first});
+  json["transfer_function"][1]["extinction"] = Json::parse("[[0, 0], [1, 9]]");
+  json["transfer_function"][0]["name"] = "thin";
+  json["transfer_function"][1]["name"] = "dense";
+  const Experiment e = parsed(json.dump());
+  ASSERT_EQ(e.renders.size(), 24u);
+  EXPECT_EQ(e.renders[0].view_name, "view 1");
+  EXPECT_EQ(e.renders[23].view_name, "side");
+  EXPECT_EQ(e.renders[0].transfer_function_name, "thin");
+  EXPECT_EQ(e.renders[6].transfer_function_name, "dense");
+  EXPECT_EQ(e.renders[6].transfer_function.extinction[1].extinction, 9);
+  EXPECT_EQ(e.renders[2].settings.step, 0.25);
+  EXPECT_EQ(e.renders[3].settings.sampling, Sampling::adaptive);
+}
+
+TEST(Experiment, ValuesThatAreListsBecomeAxesAsListsOfLists) {
+  Json json = Json::parse(kSmall);
+  json["views"][0]["eye"] = Json::parse("[[3, 0, 0], [0, 3, 0]]");
+  json["transfer_function"]["extinction"] = Json::parse("[[[0, 0], [1, 5]], [[0, 0], [1, 6]], [[0, 0], [1, 7]]]");
+  const Experiment e = parsed(json.dump());
+  ASSERT_EQ(e.renders.size(), 6u);
+  EXPECT_EQ(e.renders[0].view_name, "view 1.1");
+  EXPECT_EQ(e.renders[5].view.eye, Vec3d(0, 3, 0));
+  EXPECT_EQ(e.renders[5].transfer_function.extinction[1].extinction, 7);
+}
+
+TEST(Experiment, ModesWithoutColourHaveNoTransferFunctionAndAreNotRepeatedForEach) {
+  Json json = Json::parse(with("render", R"({"mode": ["dvr", "projection"], "early_end": 0.99})"));
+  const Json first = json["transfer_function"];
+  json["transfer_function"] = Json::array({first, first});
+  json["transfer_function"][1]["extinction"] = Json::parse("[[0, 0], [1, 9]]");
+  const Experiment e = parsed(json.dump());
+  ASSERT_EQ(e.renders.size(), 3u);
+  EXPECT_EQ(e.renders[0].settings.early_end, 0.99);
+  EXPECT_EQ(e.renders[1].settings.mode, Mode::projection);
+  EXPECT_FALSE(e.renders[1].settings.early_end);
+  EXPECT_TRUE(e.renders[1].transfer_function.extinction.empty());
+  EXPECT_TRUE(render_json(e.renders[1])["transfer_function"].is_null());
+}
+
+TEST(Experiment, ATransferFunctionIsOnlyNeededForColour) {
+  Json json = Json::parse(without("transfer_function"));
+  json["render"] = {{"mode", "mip"}};
+  EXPECT_EQ(parsed(json.dump()).points(), 1u);
+}
+
+TEST(Experiment, GeneratorAxesMakeDataSetsAndItsListsStayLists) {
+  const Experiment e =
+      parsed(with("datasets", R"([{"generate": {"field": "shell", "levels": [3, 4], "root": [32, 32, 64], "ratio": [2, 4]}}])"));
+  ASSERT_EQ(e.datasets.size(), 2u);
+  EXPECT_EQ(e.datasets[0].name, "shell levels=3");
+  EXPECT_EQ(e.datasets[1].name, "shell levels=4");
+  EXPECT_EQ(e.datasets[1].generate["levels"], 4);
+  EXPECT_EQ(e.datasets[1].generate["root"], Json::parse("[32, 32, 64]"));
+  EXPECT_EQ(e.builds[1].dataset, 1u);
+  EXPECT_EQ(parsed(with("datasets", R"({"name": "deep", "generate": {"levels": [3, 4]}})")).datasets[1].name, "deep levels=4");
+}
+
+TEST(Experiment, FramesMayBeAnAxis) {
+  const Experiment e = parsed(with("frames", "[3, 9]"));
+  ASSERT_EQ(e.renders.size(), 2u);
+  EXPECT_EQ(e.renders[1].frames, 9);
+}
+
+TEST(Experiment, ReferenceMayBeOwnOrNoneAtAll) {
+  EXPECT_FALSE(parsed(with("reference", "null")).reference);
+  const Experiment own = parsed(with("reference", R"({"step": 0.25, "filter": "own"})"));
+  EXPECT_EQ(own.reference->step, 0.25);
+  EXPECT_FALSE(own.reference->common_filter);
+  EXPECT_EQ(parsed(with("reference", R"({"filter": "basis"})")).reference->common_filter, Filter::basis);
+}
+
+TEST(Experiment, KnowsItsLimits) {
+  Json json = Json::parse(kSmall);
+  json["memory_limit"] = 1000000;
+  json["check"] = {{"psnr_db", 30}};
+  json["context"] = "osmesa";
+  json["seed"] = 7;
+  const Experiment e = parsed(json.dump());
+  EXPECT_EQ(e.memory_limit, 1000000);
+  EXPECT_EQ(e.minimum_psnr_db, 30);
+  EXPECT_EQ(e.context, "osmesa");
+  EXPECT_EQ(e.seed, 7u);
+  EXPECT_FALSE(e.baseline);
+  EXPECT_TRUE(parsed(with("baseline", "true")).baseline);
+}
+
+// --- data paths ---
+
+class DataPaths : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / fmt::format("amrtex_experiment_{}", ::getpid());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_ / "plt00010");
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  fs::path folder_;
+};
+
+TEST_F(DataPaths, AreLookedForBesideTheFileAndThenInTheCurrentFolder) {
+  const std::string text = with("datasets", R"([{"file": "plt00010/", "field": ["rho", "p"]}])");
+  const Experiment beside = parse_experiment(text, folder_ / "e.json");
+  ASSERT_EQ(beside.datasets.size(), 2u);
+  EXPECT_EQ(*beside.datasets[0].file, folder_ / "plt00010/");
+  EXPECT_EQ(beside.datasets[0].name, "plt00010");
+  EXPECT_EQ(beside.datasets[1].field, "p");
+  const fs::path before = fs::current_path();
+  fs::current_path(folder_);
+  const Experiment current = parse_experiment(text, "elsewhere/e.json");
+  fs::current_path(before);
+  EXPECT_EQ(*current.datasets[0].file, "plt00010/");
+}
+
+TEST_F(DataPaths, NameBothPlacesWhereNothingWasFound) {
+  try {
+    parse_experiment(with("datasets", R"([{"file": "plt00011"}])"), folder_ / "e.json");
+    FAIL() << "a missing file was accepted";
+  } catch (const UsageError& e) {
+    EXPECT_THAT(e.what(), AllOf(HasSubstr("datasets[0].file"), HasSubstr((folder_ / "plt00011").string()),
+                                HasSubstr((fs::current_path() / "plt00011").string())));
+  }
+}
+
+TEST_F(DataPaths, AnExperimentThatIsNotThereIsAnError) {
+  EXPECT_THROW(read_experiment(folder_ / "none.json"), Error);
+  EXPECT_THROW(read_experiment(folder_), Error);
+}
+
+// --- what is refused ---
+
+TEST(ExperimentErrors, SyntaxErrorsNameLineAndColumn) {
+  EXPECT_THAT(complaint("{\n  \"name\": \"x\",\n  \"seed\": 1,,\n}"), StartsWith("folder/e.json:3:13: not valid JSON"));
+  EXPECT_THAT(complaint("{\"name\": \"x\""), StartsWith("folder/e.json:1:"));
+  EXPECT_THAT(complaint(""), StartsWith("folder/e.json:1:1: not valid JSON"));
+  EXPECT_THAT(complaint(std::string(100000, '[') + std::string(100000, ']')), HasSubstr("nested more than"));
+  EXPECT_THAT(complaint("{\"seed\": 1e999}"), StartsWith("folder/e.json"));
+}
+
+TEST(ExperimentErrors, AKeyThatIsGivenTwiceIsNamedWithItsLine) {
+  EXPECT_THAT(complaint("{\n\"name\": \"x\",\n\"views\": [{\"eye\": 1,\n\"eye\": 2}]\n}"),
+              StartsWith("folder/e.json:4: views[0].eye: this key is given twice"));
+}
+
+TEST(ExperimentErrors, NameTheLineOfTheKey) {
+  const std::string text =
+      "{\n  \"name\": \"x\",\n  \"datasets\": [{\"generate\": {}}],\n  \"encodings\": [\n    {\"name\": \"uniform\"},\n"
+      "    {\"name\": \"page_table\",\n     \"page_sizes\": [\"}\\\"\", 4]}\n  ]\n}";
+  EXPECT_THAT(complaint(text),
+              AllOf(StartsWith("folder/e.json:7: encodings[1].page_sizes"), HasSubstr("did you mean 'page_size'?")));
+}
+
+struct Mistake {
+  const char* key;
+  const char* value;
+  const char* place;     ///< named in the message
+  const char* accepted;  ///< likewise
+};
+
+TEST(ExperimentErrors, NameKeyAndWhatIsAccepted) {
+  const Mistake mistakes[] = {
+      {"datset", "[]", "datset: unknown key", "did you mean 'datasets'?"},
+      {"region", "[[0,0,0],[1,1,1]]", "region: unknown key", "accepted: name, datasets"},
+      {"name", "3", "name:", "a string"},
+      {"name", "\"\"", "name:", "empty"},
+      {"datasets", "[]", "datasets:", "empty list"},
+      {"datasets", "[{}]", "datasets[0]:", "'file' and 'generate'"},
+      {"datasets", R"([{"file": "x", "generate": {}}])", "datasets[0]:", "'file' and 'generate'"},
+      {"datasets", R"([{"file": "no such file"}])", "datasets[0].file:", "no such file or folder"},
+      {"datasets", R"([{"generate": {}, "field": "x"}])", "datasets[0].field:", "generate"},
+      {"datasets", R"(["x"])", "datasets[0]:", "an object"},
+      {"datasets", R"([{"files": "x"}])", "datasets[0].files:", "did you mean 'file'?"},
+      {"encodings", R"([{"name": "unifrom"}])", "encodings[0].name:", "uniform"},
+      {"encodings", R"([{"page_size": 4}])", "encodings[0]:", "'name' is missing"},
+      {"encodings", R"(["uniform"])", "encodings[0]:", "an object"},
+      {"encodings", R"([{"name": "page_table", "page_size": []}])", "encodings[0].page_size:", "empty list"},
+      {"filters", R"(["nearest", "cubic"])", "filters[1]:", "linear_vertex"},
+      {"storage", R"("r64f")", "storage:", "r16f"},
+      {"filtering", R"(["soft"])", "filtering[0]:", "hardware, manual"},
+      {"render", R"({"mode": "iso"})", "render.mode:", "dvr"},
+      {"render", R"({"sampling": ["lattice", 3]})", "render.sampling[1]:", "a string"},
+      {"render", R"({"sampling": "random"})", "render.sampling:", "lattice"},
+      {"render", R"({"step": [1, 0]})", "render.step[1]:", "above 0"},
+      {"render", R"({"step": "1"})", "render.step:", "above 0"},
+      {"render", R"({"width": 0})", "render.width:", "from 1 to 16384"},
+      {"render", R"({"height": 1.5})", "render.height:", "an integer"},
+      {"render", R"({"height": 18446744073709551615})", "render.height:", "an integer"},
+      {"render", R"({"skip": 1})", "render.skip:", "true or false"},
+      {"render", R"({"early_end": 2})", "render.early_end:", "from 0 to 1"},
+      {"render", R"({"consumer": "slices"})", "render.consumer:", "raycast"},
+      {"render", R"({"integrator": "euler"})", "render.integrator:", "exponential_midpoint"},
+      {"render", R"({"tolerance": 1})", "render.tolerance: not available in this version", "mode, sampling"},
+      {"render", R"({"prune": true})", "render.prune: not available in this version", "early_end"},
+      {"render", R"({"level_of_detail": 1})", "render.level_of_detail: not available in this version", "early_end"},
+      {"render", R"({"isovalues": [0.5]})", "render.isovalues: not available in this version", "early_end"},
+      {"render", R"({"clip_planes": [[1, 0, 0, 0]]})", "render.clip_planes: not available in this version", "early_end"},
+      {"render", R"({"widht": 4})", "render.widht:", "did you mean 'width'?"},
+      {"views", "[]", "views:", "empty list"},
+      {"views", R"([{"eye": [3, 0, 0], "at": [3, 0, 0]}])", "views[0].eye:", "differ"},
+      {"views", R"([{"eye": [3, 0], "at": [0, 0, 0]}])", "views[0].eye:", "three numbers"},
+      {"views", R"([{"eye": [3, 0, 0], "looking_at": [0, 0, 0]}])", "views[0]", "looking_at"},
+      {"transfer_function", R"({"extinction": []})", "transfer_function", ""},
+      {"transfer_function", R"({"opacity": 3})", "transfer_function", "opacity"},
+      {"frames", "0", "frames:", "from 1"},
+      {"frames", "[3, \"x\"]", "frames[1]:", "an integer"},
+      {"warm_up", "-1", "warm_up:", "from 0"},
+      {"seed", "-1", "seed:", "from 0"},
+      {"seed", "[1, 2]", "seed:", "an integer"},
+      {"reference", "3", "reference:", "an object"},
+      {"reference", R"({"step": 0})", "reference.step:", "above 0"},
+      {"reference", R"({"filter": "cubic"})", "reference.filter:", "own, nearest"},
+      {"reference", R"({"filters": "own"})", "reference.filters:", "did you mean 'filter'?"},
+      {"context", "\"glx\"", "context:", "egl, egl_device, osmesa"},
+      {"memory_limit", "0", "memory_limit:", "from 1"},
+      {"baseline", "1", "baseline:", "true or false"},
+      {"check", "{}", "check:", "'psnr_db' is missing"},
+      {"check", R"({"psnr": 30})", "check.psnr:", "psnr_db"},
+  };
+  for (const Mistake& mistake : mistakes)
+    EXPECT_THAT(complaint(with(mistake.key, mistake.value)),
+                AllOf(testing::ContainsRegex("^folder/e.json:[0-9]+: "), HasSubstr(mistake.place), HasSubstr(mistake.accepted)))
+        << mistake.key << ": " << mistake.value;
+}
+
+TEST(ExperimentErrors, NameMissingKeys) {
+  for (const char* key : {"name", "datasets", "encodings", "views", "transfer_function"})
+    EXPECT_THAT(complaint(without(key)), AllOf(StartsWith("folder/e.json:1: "), HasSubstr(fmt::format("'{}' is missing", key))));
+  EXPECT_THAT(complaint("[]"), HasSubstr("an object"));
+}
+
+// --- scene files ---
+
+TEST(SceneFile, IsAnExperimentOfOnePointWithARegion) {
+  const Experiment e = parse_scene(with("region", R"({"lower": [0, 0, 0], "upper": [1, 1, 0.5]})"), "s.json");
+  const Scene scene = scene_of(e, e.renders[0]);
+  ASSERT_TRUE(scene.region);
+  EXPECT_EQ((*scene.region)[1], Vec3d(1, 1, 0.5));
+  EXPECT_EQ(scene.view.eye, Vec3d(3, 0, 0));
+  EXPECT_EQ(scene.transfer_function.extinction.size(), 2u);
+  EXPECT_EQ(parse_scene(with("region", "[[0, 0, 0], [1, 1, 2]]"), "s.json").region->at(1).z, 2);
+  EXPECT_EQ(parse_scene(without("name"), "picture.json").name, "picture");
+}
+
+TEST(SceneFile, NamesTheAxesThatItCannotHave) {
+  EXPECT_THAT(scene_complaint(with("render", R"({"step": [1, 0.5]})")), AllOf(StartsWith("s.json:"), HasSubstr("render.step")));
+  EXPECT_THAT(scene_complaint(with("region", "[[0, 0, 0], [1, 0, 1]]")), HasSubstr("region: the lower corner"));
+  EXPECT_THAT(scene_complaint(with("region", "[[0, 0, 0]]")), HasSubstr("region:"));
+  EXPECT_THAT(scene_complaint(with("region", R"({"lower": [0, 0], "upper": [1, 1, 1]})")),
+              HasSubstr("region.lower: three numbers"));
+}
+
+// --- the identity of points ---
+
+TEST(PointConfiguration, IsUniqueForEveryPointAndTheSameInEveryRun) {
+  Json json = Json::parse(with("encodings", R"([{"name": "uniform"}, {"name": "page_table", "page_size": [4, 8, 16]}])"));
+  json["filters"] = {"nearest", "linear_page"};
+  json["filtering"] = {"hardware", "manual"};
+  json["storage"] = {"r32f", "r8"};
+  json["render"] = {{"mode", {"dvr", "mip"}}, {"step", {1, 0.5}}, {"skip", {true, false}}};
+  json["frames"] = {1, 2};
+  const auto hashes = [&] {
+    const Experiment e = parsed(json.dump());
+    std::vector<std::string> list;
+    for (const BuildPoint& build : e.builds)
+      for (const RenderPoint& render : e.renders)
+        list.push_back(configuration_hash(point_configuration(e, build, render, "mesh")));
+    return list;
+  };
+  const std::vector<std::string> first = hashes();
+  EXPECT_EQ(first.size(), 4u * 3 * 2 * 16);
+  EXPECT_EQ(std::set<std::string>(first.begin(), first.end()).size(), first.size());
+  EXPECT_EQ(hashes(), first);
+}
+
+TEST(PointConfiguration, ChangesWithMeshSettingsAndReferenceButNotWithNames) {
+  const auto hash = [](const std::string& text, const char* mesh) {
+    const Experiment e = parsed(text);
+    return configuration_hash(point_configuration(e, e.builds[0], e.renders[0], mesh));
+  };
+  const std::string base = hash(kSmall, "mesh");
+  EXPECT_NE(hash(kSmall, "other"), base);
+  EXPECT_NE(hash(with("reference", "null"), "mesh"), base);
+  EXPECT_NE(hash(with("seed", "2"), "mesh"), base);
+  EXPECT_NE(hash(with("context", "\"osmesa\""), "mesh"), base);
+  EXPECT_NE(hash(with("memory_limit", "5"), "mesh"), base);
+  EXPECT_EQ(hash(with("frames", "9"), "mesh"), base);
+  EXPECT_EQ(hash(with("render", R"({"step": 1.0, "width": 512})"), "mesh"), base);
+  Json named = Json::parse(kSmall);
+  named["views"][0]["name"] = "front";
+  EXPECT_EQ(hash(named.dump(), "mesh"), base);
+}
+
+TEST(Suggestion, OnlyNamesWhatIsNear) {
+  const std::vector<std::string_view> names = {"width", "height"};
+  EXPECT_EQ(suggestion("widht", names), "; did you mean 'width'?");
+  EXPECT_EQ(suggestion("colour", names), "");
+}
+
+}  // namespace
+}  // namespace amrtex
