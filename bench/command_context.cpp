@@ -49,7 +49,8 @@ Json encodings_json(const ContextInfo* context) {
     for (Filter f : e->filters()) entry["filters"].push_back(filter_name(f));
     entry["parameters"] = Json::array();
     for (const ParameterInfo& p : e->parameters())
-      entry["parameters"].push_back({{"name", p.name}, {"description", p.description}, {"default", p.default_value}, {"accepted", p.accepted}});
+      entry["parameters"].push_back(
+          {{"name", p.name}, {"description", p.description}, {"default", p.default_value}, {"accepted", p.accepted}});
     const Support support = context != nullptr ? e->supported(*context) : Support{false, "no GL context on this machine"};
     entry["supported"] = support.ok;
     entry["reason"] = support.ok ? Json(nullptr) : Json(support.reason);
@@ -70,8 +71,8 @@ int print_encodings(bool json) {
     std::vector<std::string> filters = e["filters"];
     fmt::print("{}\n  filters: {}\n", e["name"].get<std::string>(), fmt::join(filters, ", "));
     for (const Json& p : e["parameters"])
-      fmt::print("  {}: {}; {} (default {})\n", p["name"].get<std::string>(), p["description"].get<std::string>(), p["accepted"].get<std::string>(),
-                 p["default"].dump());
+      fmt::print("  {}: {}; {} (default {})\n", p["name"].get<std::string>(), p["description"].get<std::string>(),
+                 p["accepted"].get<std::string>(), p["default"].dump());
     if (!e["supported"].get<bool>()) fmt::print("  cannot run here: {}\n", e["reason"].get<std::string>());
   }
   return 0;
@@ -84,15 +85,17 @@ void print_context(const Way& way, const ContextProbe& p) {
     return;
   }
   const GlContextInfo& i = p.info;
-  fmt::print("  renderer            {} ({})\n  GL                  {}, GLSL {}\n", i.renderer, i.software ? "software" : "hardware", i.version, i.glsl_version);
-  fmt::print("  3D texture          {} texels an axis\n  storage block       {} bytes, {} bindings\n", i.max_3d_texture_size, i.max_buffer_bytes,
-             i.max_storage_bindings);
-  fmt::print("  texture units       {}\n  viewport            {} x {}\n  timer               {} bits\n", i.max_texture_units, i.max_viewport_width,
-             i.max_viewport_height, i.timer_bits);
+  fmt::print("  renderer            {} ({})\n  GL                  {}, GLSL {}\n", i.renderer,
+             i.software ? "software" : "hardware", i.version, i.glsl_version);
+  fmt::print("  3D texture          {} texels an axis\n  storage block       {} bytes, {} bindings\n", i.max_3d_texture_size,
+             i.max_buffer_bytes, i.max_storage_bindings);
+  fmt::print("  texture units       {}\n  viewport            {} x {}\n  timer               {} bits\n", i.max_texture_units,
+             i.max_viewport_width, i.max_viewport_height, i.timer_bits);
   fmt::print("  bindless textures   {}\n  shader ballot       {}\n  extensions          {}\n", i.bindless_texture ? "yes" : "no",
              i.shader_ballot ? "yes" : "no", i.extensions.size());
   for (const Json& e : encodings_json(&i))
-    fmt::print("  encoding {:11} {}\n", e["name"].get<std::string>(), e["supported"].get<bool>() ? "can run" : "cannot run: " + e["reason"].get<std::string>());
+    fmt::print("  encoding {:11} {}\n", e["name"].get<std::string>(),
+               e["supported"].get<bool>() ? "can run" : "cannot run: " + e["reason"].get<std::string>());
 }
 
 int doctor(bool json) {
@@ -116,6 +119,11 @@ int doctor(bool json) {
 }
 
 }  // namespace
+
+void require_support(const Encoding& encoding, const ContextInfo& context) {
+  const Support support = encoding.supported(context);
+  if (!support.ok) throw UnsupportedError(fmt::format("encoding {}: {}", encoding.name(), support.reason));
+}
 
 void add_context_commands(CLI::App& app, Command& chosen) {
   auto json = std::make_shared<bool>(false);

@@ -1,9 +1,9 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
 
 #include "bench/commands.hpp"
+#include "bench/json_file.hpp"
 #include "structures/amrex_plotfile.hpp"
 #include "structures/encoding.hpp"
 #include "structures/mesh_io.hpp"
@@ -48,7 +48,8 @@ void print_info(const AmrHierarchy& mesh) {
   const Json json = info_json(mesh);
   const Vec3d lower = mesh.domain_lower();
   const Vec3d upper = mesh.domain_upper();
-  fmt::print("{}\n  domain      [{:g}, {:g}] x [{:g}, {:g}] x [{:g}, {:g}]\n", mesh.name(), lower.x, upper.x, lower.y, upper.y, lower.z, upper.z);
+  fmt::print("{}\n  domain      [{:g}, {:g}] x [{:g}, {:g}] x [{:g}, {:g}]\n", mesh.name(), lower.x, upper.x, lower.y, upper.y,
+             lower.z, upper.z);
   fmt::print("  leaf cells  {}{}\n", mesh.leaf_cells(), mesh.has_holes() ? " (the mesh has holes)" : "");
   fmt::print("  hash        {}\n\n  level  patches       cells  leaf cells  ratio to finer\n", json["hash"].get<std::string>());
   for (int l = 0; l < mesh.level_count(); ++l)
@@ -58,7 +59,8 @@ void print_info(const AmrHierarchy& mesh) {
   for (std::size_t f = 0; f < mesh.fields().size(); ++f) {
     const FieldStatistics& s = mesh.statistics(static_cast<int>(f));
     fmt::print("  {:12} {:12.6g} {:14.6g} {:16.9g}\n", mesh.fields()[f], s.min, s.max, s.volume_integral);
-    if (s.cells_without_value > 0) fmt::print("    {} leaf cells have no value (NaN or infinite); they are not drawn\n", s.cells_without_value);
+    if (s.cells_without_value > 0)
+      fmt::print("    {} leaf cells have no value (NaN or infinite); they are not drawn\n", s.cells_without_value);
   }
   for (bool p : mesh.periodic())
     if (p) {
@@ -69,17 +71,10 @@ void print_info(const AmrHierarchy& mesh) {
 
 /// A file with a specification, or the specification itself.
 Json read_specification(const std::string& text) {
-  std::string json = text;
-  if (text.empty() || text.front() != '{') {
-    std::ifstream file(text);
-    if (!file) throw UsageError(fmt::format("{}: cannot be read; accepted: a JSON file, or the JSON itself in quotes", text));
-    json.assign(std::istreambuf_iterator<char>(file), {});
-  }
-  try {
-    return Json::parse(json);
-  } catch (const Json::parse_error& error) {
-    throw UsageError(fmt::format("specification {}: {}", text.front() == '{' ? "on the command line" : text, error.what()));
-  }
+  if (!text.empty() && text.front() == '{') return JsonFile(text, "specification").root().json();
+  if (!fs::is_regular_file(text))
+    throw UsageError(fmt::format("{}: no such file; accepted: a JSON file, or the JSON itself in quotes", text));
+  return JsonFile::read(text).root().json();
 }
 
 }  // namespace
@@ -99,8 +94,10 @@ void add_mesh_commands(CLI::App& app, Command& chosen) {
   info->callback([a, &chosen] {
     chosen = [a] {
       const AmrHierarchy mesh(read_mesh(a->input, a->field.empty() ? std::nullopt : std::optional(a->field)));
-      if (a->json) fmt::print("{}\n", info_json(mesh).dump(2));
-      else print_info(mesh);
+      if (a->json)
+        fmt::print("{}\n", info_json(mesh).dump(2));
+      else
+        print_info(mesh);
       return 0;
     };
   });
@@ -120,10 +117,13 @@ void add_mesh_commands(CLI::App& app, Command& chosen) {
   convert->add_option("in", a->input, "data set")->required();
   convert->add_option("out", a->output, "folder to write; must not exist")->required();
   convert->add_option("--field", a->field, "only this field");
-  convert->footer("Example: amrtex convert data/amrex_tiny/plt00008 out/copy\nValues under finer patches become the means of what covers them.");
+  convert->footer(
+      "Example: amrtex convert data/amrex_tiny/plt00008 out/copy\nValues under finer patches become the means of what covers "
+      "them.");
   convert->callback([a, &chosen] {
     chosen = [a] {
-      write_amrex_plotfile(AmrHierarchy(read_mesh(a->input, a->field.empty() ? std::nullopt : std::optional(a->field))), a->output);
+      write_amrex_plotfile(AmrHierarchy(read_mesh(a->input, a->field.empty() ? std::nullopt : std::optional(a->field))),
+                           a->output);
       return 0;
     };
   });

@@ -45,11 +45,17 @@ int run(const Arguments& a) {
   request.parameters = build.parameters;
   request.context = context->info();
   request.needs = scene_needs(drawn, build.filter, build.filtering);
-  if (!a.memory_limit.empty()) request.memory_limit = parse_bytes(a.memory_limit);
-  else if (scene.memory_limit) request.memory_limit = *scene.memory_limit;
-  const EncodedField field = find_encoding(build.encoding).build(mesh, request);
+  if (!a.memory_limit.empty())
+    request.memory_limit = parse_bytes(a.memory_limit);
+  else if (scene.memory_limit)
+    request.memory_limit = *scene.memory_limit;
+  const Encoding& encoding = find_encoding(build.encoding);
+  require_support(encoding, request.context);
+  const EncodedField field = encoding.build(mesh, request);
   if (a.reference) {
-    const double step = a.reference_step > 0 ? a.reference_step : scene.reference ? scene.reference->step : ReferenceSettings{}.step;
+    const double step = a.reference_step > 0 ? a.reference_step
+                        : scene.reference    ? scene.reference->step
+                                             : ReferenceSettings{}.step;
     write_picture(a, HierarchyReference(mesh, 0, field.definition).render(drawn, step), scene, mesh);
     return 0;
   }
@@ -72,7 +78,7 @@ void add_render_command(CLI::App& app, Command& chosen) {
   c->add_flag("--reference", a->reference, "draw the double-precision reference of the filter instead");
   c->add_option("--reference-step", a->reference_step, "its step, in widths of the finest cells");
   c->add_flag("--color-bar", a->color_bar, "a bar with the range, for the modes projection and mip");
-  c->footer("Example: amrtex render experiments/quickstart/scene.json -o picture.png");
+  c->footer("Example: amrtex render experiments/limits/scene.json -o picture.png");
   c->callback([a, &chosen] { chosen = [a] { return run(*a); }; });
 }
 

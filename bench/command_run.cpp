@@ -60,11 +60,16 @@ int run(const Arguments& a) {
   const std::vector<Table> tables = tables_of(a.output, "");
   write_tables(a.output, tables);
   if (a.json) {
-    const Json json{{"measured", s.measured}, {"kept", s.kept}, {"unsupported", s.unsupported}, {"over_budget", s.over_budget}, {"failed", s.failed}};
+    const Json json{{"measured", s.measured},
+                    {"kept", s.kept},
+                    {"unsupported", s.unsupported},
+                    {"over_budget", s.over_budget},
+                    {"failed", s.failed}};
     fmt::print("{}\n", json.dump());
   } else {
     for (const Table& t : tables) fmt::print("{}\n", to_markdown(t));
-    fmt::print("{} points measured, {} kept, {} unsupported, {} over budget, {} failed\n", s.measured, s.kept, s.unsupported, s.over_budget, s.failed);
+    fmt::print("{} points measured, {} kept, {} unsupported, {} over budget, {} failed\n", s.measured, s.kept, s.unsupported,
+               s.over_budget, s.failed);
     fmt::print("records, pictures and tables: {}\n", a.output);
   }
   return s.failed > 0 ? 1 : 0;
@@ -93,7 +98,8 @@ std::int64_t parse_bytes(const std::string& text) {
   if (unit == "KiB") factor = 1024;
   if (unit == "MiB") factor = 1024.0 * 1024;
   if (unit == "GiB") factor = 1024.0 * 1024 * 1024;
-  if (!(number >= 0) || factor == 0 || number * factor > 9e18) throw UsageError(fmt::format("{} is no amount of memory; accepted: 500000, 64KiB, 512MiB, 2GiB", text));
+  if (!(number >= 0) || factor == 0 || number * factor > 9e18)
+    throw UsageError(fmt::format("{} is no amount of memory; accepted: 500000, 64KiB, 512MiB, 2GiB", text));
   return static_cast<std::int64_t>(number * factor);
 }
 

@@ -64,6 +64,7 @@ std::vector<Sampled> sample(const Arguments& a) {
   const AmrHierarchy mesh(read_mesh(a.data, a.field.empty() ? std::nullopt : std::optional(a.field)));
   const auto context = make_context(kind);
   request.context = context->info();
+  require_support(encoding, request.context);
   const EncodedField field = encoding.build(mesh, request);
   const GpuField gpu(field, *context);
 
@@ -112,11 +113,12 @@ int run(const Arguments& a) {
     return 0;
   }
   const auto text = [](bool found, double v) { return found ? fmt::format("{:.9g}", v) : std::string("-"); };
-  fmt::print("{:>12} {:>12} {:>12} {:>5} {:>16} {:>16} {:>16}\n", "x", "y", "z", "level", "reference", "encoding double", "encoding GL");
+  fmt::print("{:>12} {:>12} {:>12} {:>5} {:>16} {:>16} {:>16}\n", "x", "y", "z", "level", "reference", "encoding double",
+             "encoding GL");
   for (const Sampled& s : samples)
-    fmt::print("{:12.6g} {:12.6g} {:12.6g} {:>5} {:>16} {:>16} {:>16}\n", s.p.x, s.p.y, s.p.z, s.level < 0 ? "-" : std::to_string(s.level),
-               text(s.reference.has_value(), s.reference.value_or(0)), text(s.encoding_double.found, s.encoding_double.value),
-               text(s.encoding_gl.found, s.encoding_gl.value));
+    fmt::print("{:12.6g} {:12.6g} {:12.6g} {:>5} {:>16} {:>16} {:>16}\n", s.p.x, s.p.y, s.p.z,
+               s.level < 0 ? "-" : std::to_string(s.level), text(s.reference.has_value(), s.reference.value_or(0)),
+               text(s.encoding_double.found, s.encoding_double.value), text(s.encoding_gl.found, s.encoding_gl.value));
   return 0;
 }
 
@@ -135,7 +137,9 @@ void add_sample_command(CLI::App& app, Command& chosen) {
   c->add_option("--filtering", a->filtering, "hardware or manual");
   c->add_option("--context", a->context, "egl, egl_device or osmesa");
   c->add_flag("--json", a->json, "for programs");
-  c->footer("Example: amrtex sample data/amrex_tiny/plt00008 --encoding page_table --filter linear_page --parameter page_size=8 --points points.txt");
+  c->footer(
+      "Example: amrtex sample data/amrex_tiny/plt00008 --encoding page_table --filter linear_page --parameter page_size=8 "
+      "--points points.txt");
   c->callback([a, &chosen] { chosen = [a] { return run(*a); }; });
 }
 

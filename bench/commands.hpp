@@ -7,6 +7,8 @@
 #include <functional>
 #include <string>
 
+#include "structures/encoding.hpp"
+
 namespace amrtex {
 
 using Command = std::function<int()>;
@@ -16,9 +18,11 @@ void add_mesh_commands(CLI::App& app, Command& chosen);     // info, generate, c
 void add_context_commands(CLI::App& app, Command& chosen);  // encodings, doctor
 void add_sample_command(CLI::App& app, Command& chosen);
 void add_render_command(CLI::App& app, Command& chosen);
-void add_run_commands(CLI::App& app, Command& chosen);      // run, report
+void add_run_commands(CLI::App& app, Command& chosen);  // run, report
 
 /// "512MiB", "2GiB", "1000000". Throws UsageError.
 std::int64_t parse_bytes(const std::string& text);
+/// Throws UnsupportedError with the encoding's reason where this context cannot hold it.
+void require_support(const Encoding& encoding, const ContextInfo& context);
 
 }  // namespace amrtex

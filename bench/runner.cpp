@@ -5,6 +5,7 @@
 #include <chrono>
 #include <map>
 #include <memory>
+#include <random>
 
 #include "bench/environment.hpp"
 #include "bench/image_error.hpp"
@@ -60,11 +61,24 @@ class Runner {
         context_(make_context(parse_context_kind(experiment.context))) {}
 
   RunSummary run() {
-    for (const BuildPoint& build : experiment_.builds) run_build(build);
+    for (const BuildPoint* build : measuring_order()) run_build(*build);
     return summary_;
   }
 
  private:
+  /// The builds of each data set, shuffled by the seed: what drifts with time must not favour
+  /// an encoding because of its place in the file.
+  std::vector<const BuildPoint*> measuring_order() const {
+    std::vector<const BuildPoint*> order;
+    for (const BuildPoint& build : experiment_.builds) order.push_back(&build);
+    std::mt19937_64 random(experiment_.seed);
+    for (std::size_t i = order.size(); i > 1; --i) {
+      const std::size_t j = random() % i;
+      if (order[i - 1]->dataset == order[j]->dataset) std::swap(order[i - 1], order[j]);
+    }
+    return order;
+  }
+
   void load(std::size_t dataset) {
     if (mesh_ && loaded_ == dataset) return;
     baseline_.reset();
@@ -152,7 +166,7 @@ class Runner {
     record["image_hash"] = picture_hash(picture);
     record["context"]["shader_hash"] = raycaster.shader_hash();
     if (!raycaster.transfer_exact())
-      warn(record, "the transfer function's points are not evenly spaced: it is drawn from a table of 4096 bins");
+      warn(record, "the transfer function has more than 16 points: it is drawn from a table of 4096 bins");
     if (!add_errors(record, picture, built.field, scene)) {
       write(build, render, record);
       return;  // a wrong picture gets no time
@@ -176,6 +190,7 @@ class Runner {
     const Picture own = cached_reference(*mesh_, field.definition, scene, reference.step, cache, hash);
     const ErrorMetrics error = compare(picture, own);
     record["error"] = error_json(error, hash);
+    record["error"]["split"] = nullptr;
     if (reference.common_filter) {
       FilterDefinition common{*reference.common_filter, 0, mesh_->finest_level()};
       if (common.filter != Filter::linear_page) common.page_level = 0;

@@ -5,7 +5,8 @@
 
 namespace amrtex {
 
-/// One GL_TIME_ELAPSED query. On a software rasteriser it is CPU time of its threads.
+/// One GL_TIME_ELAPSED query. On llvmpipe the query starts anew in every tile, so it times only
+/// the last ones: of use on hardware alone.
 class GpuTimer {
  public:
   explicit GpuTimer(Context& context);

@@ -22,7 +22,7 @@ struct Drawing {
   Vec3d domain_lower;    // world
   Vec3d cells_a_length;  // finest cells a world length, along the axes
   Mode mode;
-  double part;           // world length of the largest part
+  double part;  // world length of the largest part
   const TransferTable* table;
 };
 
@@ -106,9 +106,15 @@ void draw_pixel(ReferenceTracer& tracer, const Drawing& drawing, int x, int y, P
   const double end = span->to - span->from;
   double* pixel = picture.pixel(x, y);
   switch (drawing.mode) {
-    case Mode::dvr: draw_light(tracer, ray, end, drawing, pixel); break;
-    case Mode::projection: *pixel = line_integral(tracer, ray, end, drawing.part); break;
-    case Mode::mip: *pixel = line_maximum(tracer, ray, end); break;
+    case Mode::dvr:
+      draw_light(tracer, ray, end, drawing, pixel);
+      break;
+    case Mode::projection:
+      *pixel = line_integral(tracer, ray, end, drawing.part);
+      break;
+    case Mode::mip:
+      *pixel = line_maximum(tracer, ray, end);
+      break;
   }
 }
 
@@ -199,11 +205,16 @@ std::optional<double> HierarchyReference::sample(const FinestPosition& p) const 
   const ReferenceLeaf leaf = data_->field.find_leaf(p.cell);
   if (leaf.level < 0 || std::isnan(leaf.value)) return std::nullopt;
   switch (data_->field.definition().filter) {
-    case Filter::nearest: return leaf.value;
-    case Filter::linear_lod: return data_->linear(leaf.level, p);
-    case Filter::linear_page: return data_->linear(data_->field.page_level(p.cell), p);
-    case Filter::linear_vertex: return data_->vertex(leaf, p);
-    case Filter::basis: return data_->basis(p);
+    case Filter::nearest:
+      return leaf.value;
+    case Filter::linear_lod:
+      return data_->linear(leaf.level, p);
+    case Filter::linear_page:
+      return data_->linear(data_->field.page_level(p.cell), p);
+    case Filter::linear_vertex:
+      return data_->vertex(leaf, p);
+    case Filter::basis:
+      return data_->basis(p);
   }
   return std::nullopt;
 }

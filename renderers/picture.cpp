@@ -36,7 +36,9 @@ std::string npy_header(const Picture& picture, bool as_double) {
   return header + text;
 }
 
-[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) { throw Error(fmt::format("{}: {}", path.string(), why)); }
+[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {
+  throw Error(fmt::format("{}: {}", path.string(), why));
+}
 
 /// Text between a key of the header's dictionary and the end of its value.
 std::string header_value(const std::string& header, const std::string& key, const std::filesystem::path& path) {
@@ -63,7 +65,8 @@ Picture shape_of(const std::string& header, const std::filesystem::path& path) {
 template <class T>
 void read_values(std::ifstream& in, Picture& picture, std::size_t count, const std::filesystem::path& path) {
   std::vector<T> values(count);
-  if (!in.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(count * sizeof(T)))) refuse(path, "cannot be read");
+  if (!in.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(count * sizeof(T))))
+    refuse(path, "cannot be read");
   picture.values.assign(values.begin(), values.end());
 }
 
@@ -104,7 +107,8 @@ Picture read_npy(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) refuse(path, fmt::format("cannot be opened: {}", std::strerror(errno)));
   std::array<char, kMagicBytes> magic{};
-  if (!in.read(magic.data(), magic.size()) || std::memcmp(magic.data(), "\x93NUMPY\x01", 7) != 0) refuse(path, "is no npy file of version 1");
+  if (!in.read(magic.data(), magic.size()) || std::memcmp(magic.data(), "\x93NUMPY\x01", 7) != 0)
+    refuse(path, "is no npy file of version 1");
   const std::size_t length = static_cast<unsigned char>(magic[8]) + std::size_t{256} * static_cast<unsigned char>(magic[9]);
   std::string header(length, ' ');
   if (!in.read(header.data(), static_cast<std::streamsize>(length))) refuse(path, "ends inside its npy header");

@@ -16,8 +16,8 @@ namespace {
 
 using Rgb = std::array<double, 3>;  // sRGB, 0 to 1
 
-constexpr int kBarWidth = 16;    // pixels
-constexpr int kBarMargin = 8;    // pixels
+constexpr int kBarWidth = 16;  // pixels
+constexpr int kBarMargin = 8;  // pixels
 constexpr int kGlyphWidth = 3, kGlyphHeight = 5, kGlyphScale = 2;
 constexpr int kAdvance = (kGlyphWidth + 1) * kGlyphScale;
 
@@ -30,7 +30,8 @@ struct Canvas {
   void set(int x, int y, const Rgb& color) {
     if (x < 0 || y < 0 || x >= width || y >= height) return;
     const std::size_t i = (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)) * 3;
-    for (std::size_t c = 0; c < 3; ++c) bytes[i + c] = static_cast<std::uint8_t>(std::lround(255 * std::clamp(color[c], 0.0, 1.0)));
+    for (std::size_t c = 0; c < 3; ++c)
+      bytes[i + c] = static_cast<std::uint8_t>(std::lround(255 * std::clamp(color[c], 0.0, 1.0)));
   }
 };
 
@@ -135,7 +136,8 @@ Canvas draw_light(const Picture& picture, const PngOptions& options) {
 Canvas draw_values(const Picture& picture, const PngOptions& options) {
   const Range range(picture, options.logarithmic);
   const bool bar = options.color_bar && !range.empty();
-  const BarText text = bar ? BarText{fmt::format("{:.4g}", range.max), fmt::format("{:.4g}", range.min), options.unit} : BarText{};
+  const BarText text =
+      bar ? BarText{fmt::format("{:.4g}", range.max), fmt::format("{:.4g}", range.min), options.unit} : BarText{};
   Canvas canvas(picture.width + (bar ? 3 * kBarMargin + kBarWidth + text.width() : 0), picture.height);
   const Rgb behind = display(options.background);
   for (int y = 0; y < canvas.height; ++y)
@@ -152,8 +154,8 @@ Canvas draw_values(const Picture& picture, const PngOptions& options) {
 
 void write_png(const Picture& picture, const std::filesystem::path& path, const PngOptions& options) {
   if (picture.width < 1 || picture.height < 1 || (picture.channels != 1 && picture.channels != 4))
-    throw Error(fmt::format("{}: a picture of {} x {} pixels and {} channels; PNG takes 1 or 4 channels", path.string(), picture.width,
-                            picture.height, picture.channels));
+    throw Error(fmt::format("{}: a picture of {} x {} pixels and {} channels; PNG takes 1 or 4 channels", path.string(),
+                            picture.width, picture.height, picture.channels));
   const Canvas canvas = picture.channels == 4 ? draw_light(picture, options) : draw_values(picture, options);
   png_image image{};
   image.version = PNG_IMAGE_VERSION;

@@ -106,7 +106,8 @@ TransferTable::TransferTable(const TransferFunction& tf, double extinction_scale
     const double b = knots_[std::min(k, knots_.size() - 1)];
     Light lower{tf.extinction_at(a) * extinction_scale, tf.color_at(a)};
     Light upper{tf.extinction_at(b) * extinction_scale, tf.color_at(b)};
-    if (std::isinf(lower.extinction + upper.extinction)) lower.extinction = upper.extinction = lower.extinction + upper.extinction;
+    if (std::isinf(lower.extinction + upper.extinction))
+      lower.extinction = upper.extinction = lower.extinction + upper.extinction;
     const double width = tf.axis(b) - tf.axis(a);
     const bool one_color = lower.rgb == upper.rgb;
     segments_.push_back({tf.axis(a), width > 0 ? 1 / width : 0, lower, upper, one_color && lower.extinction == upper.extinction,
@@ -124,7 +125,8 @@ TransferTable::Light TransferTable::light(const Segment& segment, double value) 
   const double axis = logarithmic_ ? std::log10(value) : value;
   const double w = std::clamp((axis - segment.axis_lower) * segment.inverse_width, 0.0, 1.0);
   // an infinite extinction is the segment's at both ends, and infinity minus itself is not a number
-  const double rise = segment.upper.extinction == segment.lower.extinction ? 0 : segment.upper.extinction - segment.lower.extinction;
+  const double rise =
+      segment.upper.extinction == segment.lower.extinction ? 0 : segment.upper.extinction - segment.lower.extinction;
   return {segment.lower.extinction + w * rise, segment.lower.rgb + w * (segment.upper.rgb - segment.lower.rgb)};
 }
 
@@ -168,8 +170,8 @@ void LightIntegral::add_interval(const PieceFunction& f, double from, double to,
 
 /// One part, or where it is longer than wanted its halves, as long as it is not thin: in a cell
 /// thousands of the finest wide, f is one cubic, and most of its parts would only cost time.
-void LightIntegral::add_parts(const PieceFunction& f, const TransferTable::Segment& segment, double middle, double width, double length,
-                              double max_part) {
+void LightIntegral::add_parts(const PieceFunction& f, const TransferTable::Segment& segment, double middle, double width,
+                              double length, double max_part) {
   if (transmittance_ < kOpaque) return;
   const double offset = width / (2 * kSqrt3);
   const auto first = table_.light(segment, f(middle - offset));

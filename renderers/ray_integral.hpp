@@ -51,9 +51,9 @@ class TransferTable {
   struct Segment {
     double axis_lower, inverse_width;  ///< of value or log10(value); 0 where the segment is constant
     Light lower, upper;
-    bool constant;      ///< both curves
+    bool constant;  ///< both curves
     bool one_color;
-    bool visible;       ///< extinction is not 0 throughout
+    bool visible;  ///< extinction is not 0 throughout
   };
 
   const std::vector<double>& knots() const { return knots_; }
@@ -93,7 +93,7 @@ class LightIntegral {
   void add_part(const TransferTable::Light& first, const TransferTable::Light& second, double depth);
 
   const TransferTable& table_;
-  Vec3d color_{0};  // premultiplied
+  Vec3d color_{0};    // premultiplied
   double depth_ = 0;  // optical, from the eye
   double transmittance_ = 1;
   std::vector<double> breaks_;

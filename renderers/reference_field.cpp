@@ -49,7 +49,8 @@ ReferenceField::ReferenceField(const AmrHierarchy& hierarchy, int field, const F
     : hierarchy_(hierarchy), definition_(definition) {
   const int n = hierarchy.level_count();
   if (definition.page_size < 0) throw Error(fmt::format("page_size {}: must not be negative", definition.page_size));
-  if (definition.filter == Filter::linear_page && definition.page_size == 0 && (definition.page_level < 0 || definition.page_level >= n))
+  if (definition.filter == Filter::linear_page && definition.page_size == 0 &&
+      (definition.page_level < 0 || definition.page_level >= n))
     throw Error(fmt::format("page level {}: data set {} has levels 0 to {}", definition.page_level, hierarchy.name(), n - 1));
   levels_.resize(static_cast<std::size_t>(n));
   std::atomic<bool> missing = hierarchy.has_holes();
@@ -280,7 +281,8 @@ void ReferenceField::split_pages(int level) {
 int ReferenceField::page_level(const Vec3i& finest_cell) const {
   if (definition_.page_size == 0) return definition_.page_level;
   int level = 0;
-  while (level < hierarchy_.finest_level() && at(level).split_pages.contains(finest_cell / width(level) / definition_.page_size)) ++level;
+  while (level < hierarchy_.finest_level() && at(level).split_pages.contains(finest_cell / width(level) / definition_.page_size))
+    ++level;
   return level;
 }
 

@@ -107,7 +107,7 @@ class ReferenceField {
   };
   struct PatchView {
     Box box;
-    const double* values;        // of the file
+    const double* values;  // of the file
     const std::uint8_t* leaf;
     std::vector<double> means;   // v_L, where the patch has refined cells; else empty
     std::vector<double> shares;  // where they are not all 1; else empty

@@ -63,11 +63,15 @@ void ReferenceTracer::locate() {
   lower_ = Vec3d(0);
   upper_ = domain_;
   switch (filter_) {
-    case Filter::nearest: return locate_nearest();
+    case Filter::nearest:
+      return locate_nearest();
     case Filter::linear_lod:
-    case Filter::linear_page: return locate_linear();
-    case Filter::linear_vertex: return locate_vertex();
-    case Filter::basis: return locate_basis();
+    case Filter::linear_page:
+      return locate_linear();
+    case Filter::linear_vertex:
+      return locate_vertex();
+    case Filter::basis:
+      return locate_basis();
   }
 }
 
@@ -205,9 +209,9 @@ Cubic ReferenceTracer::along(const Trilinear& f, const Vec3d& lower, double widt
   const double c0 = a[4] + a[5] * q.x, c1 = a[5] * d.x;
   const double d0 = a[6] + a[7] * q.x, d1 = a[7] * d.x;
   const double yz0 = q.y * q.z, yz1 = q.y * d.z + d.y * q.z, yz2 = d.y * d.z;
-  return {{a0 + b0 * q.y + c0 * q.z + d0 * yz0,                                                 //
-           a1 + b0 * d.y + b1 * q.y + c0 * d.z + c1 * q.z + d0 * yz1 + d1 * yz0,                //
-           b1 * d.y + c1 * d.z + d0 * yz2 + d1 * yz1,                                           //
+  return {{a0 + b0 * q.y + c0 * q.z + d0 * yz0,                                   //
+           a1 + b0 * d.y + b1 * q.y + c0 * d.z + c1 * q.z + d0 * yz1 + d1 * yz0,  //
+           b1 * d.y + c1 * d.z + d0 * yz2 + d1 * yz1,                             //
            d1 * yz2}};
 }
 

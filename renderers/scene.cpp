@@ -37,7 +37,8 @@ void check_points(const std::vector<Point>& points, const char* key, bool logari
     const double v = points[k].value;
     if (!std::isfinite(v)) throw Error(fmt::format("transfer function: '{}' point {}: the value {} is not finite", key, k, v));
     if (logarithmic && v <= 0)
-      throw Error(fmt::format("transfer function: '{}' point {}: the value {} must be above 0 on a logarithmic scale", key, k, v));
+      throw Error(
+          fmt::format("transfer function: '{}' point {}: the value {} must be above 0 on a logarithmic scale", key, k, v));
     if (k > 0 && !(v > points[k - 1].value))
       throw Error(fmt::format("transfer function: '{}' point {}: the value {} does not lie above the one before, {}", key, k, v,
                               points[k - 1].value));
@@ -91,7 +92,8 @@ Json list(const Vec3d& v) { return Json::array({v.x, v.y, v.z}); }
 }  // namespace
 
 CameraFrame camera_frame(const View& view, int width, int height) {
-  if (width < 1 || height < 1) throw Error(fmt::format("view: a picture of {} x {} pixels; both must be at least 1", width, height));
+  if (width < 1 || height < 1)
+    throw Error(fmt::format("view: a picture of {} x {} pixels; both must be at least 1", width, height));
   CameraFrame camera;
   camera.eye = view.eye;
   camera.orthographic = view.orthographic;
@@ -100,9 +102,11 @@ CameraFrame camera_frame(const View& view, int width, int height) {
   if (!(glm::length(right) > 1e-9)) throw Error("view: 'up' must not be parallel to the direction from 'eye' to 'at'");
   double half_height = view.height / 2;
   if (view.orthographic) {
-    if (!(view.height > 0) || !std::isfinite(view.height)) throw Error(fmt::format("view: 'height' is {}; it must be positive", view.height));
+    if (!(view.height > 0) || !std::isfinite(view.height))
+      throw Error(fmt::format("view: 'height' is {}; it must be positive", view.height));
   } else {
-    if (!(view.fov_y > 0 && view.fov_y < 180)) throw Error(fmt::format("view: 'fov_y' is {}; it must lie between 0 and 180 degrees", view.fov_y));
+    if (!(view.fov_y > 0 && view.fov_y < 180))
+      throw Error(fmt::format("view: 'fov_y' is {}; it must lie between 0 and 180 degrees", view.fov_y));
     half_height = std::tan(glm::radians(view.fov_y) / 2);
   }
   camera.right = glm::normalize(right) * (half_height * width / height);
@@ -153,7 +157,8 @@ void validate(const TransferFunction& tf) {
   check_points(tf.color, "color", tf.logarithmic);
   for (std::size_t k = 0; k < tf.extinction.size(); ++k)
     if (!(tf.extinction[k].extinction >= 0))
-      throw Error(fmt::format("transfer function: 'extinction' point {}: the extinction {} must not be negative", k, tf.extinction[k].extinction));
+      throw Error(fmt::format("transfer function: 'extinction' point {}: the extinction {} must not be negative", k,
+                              tf.extinction[k].extinction));
   for (std::size_t k = 0; k < tf.color.size(); ++k)
     for (int c = 0; c < 3; ++c)
       if (!(tf.color[k].rgb[c] >= 0 && tf.color[k].rgb[c] <= 1))
@@ -162,9 +167,12 @@ void validate(const TransferFunction& tf) {
 
 std::string_view mode_name(Mode mode) {
   switch (mode) {
-    case Mode::dvr: return "dvr";
-    case Mode::projection: return "projection";
-    case Mode::mip: return "mip";
+    case Mode::dvr:
+      return "dvr";
+    case Mode::projection:
+      return "projection";
+    case Mode::mip:
+      return "mip";
   }
   return "";
 }
@@ -188,12 +196,14 @@ View parse_view(const Json& json) {
   constexpr std::array<const char*, 2> kProjections{"perspective", "orthographic"};
   check_keys(json, "view", kKeys);
   for (const char* key : {"eye", "at"})
-    if (!json.contains(key)) throw UsageError(fmt::format("view: the key '{}' is missing; it accepts three numbers [x, y, z]", key));
+    if (!json.contains(key))
+      throw UsageError(fmt::format("view: the key '{}' is missing; it accepts three numbers [x, y, z]", key));
   View view;
   view.eye = vector_of(json["eye"], "view", "eye");
   view.at = vector_of(json["at"], "view", "at");
   if (json.contains("up")) view.up = vector_of(json["up"], "view", "up");
-  if (json.contains("projection")) view.orthographic = choice(json["projection"], "view", "projection", kProjections) == "orthographic";
+  if (json.contains("projection"))
+    view.orthographic = choice(json["projection"], "view", "projection", kProjections) == "orthographic";
   if (view.orthographic != json.contains("height"))
     throw UsageError("view: 'height' (world height of the picture) belongs to the projection 'orthographic' and only there");
   if (view.orthographic && json.contains("fov_y")) throw UsageError("view: 'fov_y' belongs to the projection 'perspective'");

@@ -8,11 +8,14 @@
 namespace amrtex {
 namespace {
 
-constexpr int kLargestTable = 4096;
+/// Transfer functions of more points are drawn from a table.
+constexpr std::size_t kMostPoints = 16;
+constexpr int kTableBins = 4096;
+constexpr std::size_t kMostInvisibleRanges = 8;
 
-/// Beyond this many cells, floats of a whole ray would be off by more than the lattice's
-/// quantum of 2^-12 of a cell; then rays are held in double.
-constexpr int kFloatRayCells = 4096;
+/// Beyond this many cells a float cannot hold a position on the lattice (2^-13 of a cell);
+/// then rays are held in double and positions are rounded once more in each region.
+constexpr int kFloatRayCells = 2048;
 
 double smallest_edge(const AmrHierarchy& h) {
   const Vec3d s = h.spacing(h.finest_level());
@@ -27,77 +30,60 @@ bool needs_double_rays(const AmrHierarchy& h, const Scene& scene) {
   return std::max({n.x, n.y, n.z}) > kFloatRayCells || distance > 16 * glm::length(size) || narrow;
 }
 
-std::vector<double> table_points(const TransferFunction& tf) {
-  std::vector<double> points;
-  for (const auto& p : tf.extinction) points.push_back(tf.axis(p.value));
-  for (const auto& p : tf.color) points.push_back(tf.axis(p.value));
-  std::sort(points.begin(), points.end());
-  return points;
-}
-
-/// Smallest number of bins with every point on an entry; the largest table where there is none.
-int table_bins(const std::vector<double>& points, bool& exact) {
-  const double lower = points.front();
-  const double span = points.back() - lower;
-  exact = true;
-  if (!(span > 0)) return 1;
-  for (int bins = 1; bins <= kLargestTable; ++bins)
-    if (std::all_of(points.begin(), points.end(), [&](double p) {
-          const double x = (p - lower) / span * bins;
-          return std::abs(x - std::round(x)) < 1e-9 * bins;
-        }))
-      return bins;
-  exact = false;
-  return kLargestTable;
-}
-
-struct TransferTable {
-  HostTexture table = make_buffer("transfer_table", TexelFormat::rgba32f, 1);
-  HostTexture next_visible = make_buffer("transfer_next_visible", TexelFormat::r32f, 1);
-  double lower = 0;
-  double scale = 1;
-  int last = 1;
-  bool exact = true;
-};
-
 /// `unit`: multiplies extinction so that it is per unit of ray length.
-TransferTable make_table(const TransferFunction& tf, double unit) {
-  TransferTable t;
-  const std::vector<double> points = table_points(tf);
-  const int bins = table_bins(points, t.exact);
-  const double span = points.back() - points.front();
-  t.lower = points.front();
-  t.scale = span > 0 ? bins / span : 1;
-  t.last = bins;
-  t.table = make_buffer("transfer_table", TexelFormat::rgba32f, bins + 1);
-  t.next_visible = make_buffer("transfer_next_visible", TexelFormat::r32f, bins + 1);
-  auto* entries = t.table.as<float>();
-  auto* visible = t.next_visible.as<float>();
-  const auto value_at = [&](int i) {
-    const double x = i == bins ? points.back() : t.lower + i / t.scale;
-    return tf.logarithmic ? std::pow(10.0, x) : x;
-  };
-  for (int i = 0; i <= bins; ++i) {
-    const double v = value_at(i);
-    const Vec3d rgb = tf.color_at(v);
-    const double kappa = std::min(tf.extinction_at(v) * unit, 3e38);
-    entries[4 * i] = static_cast<float>(rgb.x);
-    entries[4 * i + 1] = static_cast<float>(rgb.y);
-    entries[4 * i + 2] = static_cast<float>(rgb.z);
-    entries[4 * i + 3] = static_cast<float>(kappa);
+void add_points(const TransferFunction& tf, double unit, UniformValues& uniforms) {
+  std::vector<double> extinction;
+  for (std::size_t i = 0; i < tf.extinction.size(); ++i) {
+    const double x = tf.axis(tf.extinction[i].value);
+    const double kappa = std::min(tf.extinction[i].extinction * unit, 1e30);
+    double slope = 0;
+    if (i + 1 < tf.extinction.size())
+      slope = (std::min(tf.extinction[i + 1].extinction * unit, 1e30) - kappa) / (tf.axis(tf.extinction[i + 1].value) - x);
+    extinction.insert(extinction.end(), {x, kappa, slope});
   }
-  constexpr float kNever = 3e38F;
-  constexpr float kAlways = -3e38F;
-  // beyond the last point the function is constant, so values above it may be visible too
-  visible[bins] = entries[4 * bins + 3] > 0 ? kAlways : kNever;
-  for (int i = bins - 1; i >= 0; --i) {
-    const bool bin = entries[4 * i + 3] > 0 || entries[4 * (i + 1) + 3] > 0;
-    const auto from = static_cast<float>(value_at(i) - 1e-6 * std::abs(value_at(i)));
-    visible[i] = bin ? from : visible[i + 1];
-    if (!bin && visible[i + 1] == kAlways) visible[i] = static_cast<float>(value_at(bins) - 1e-6 * std::abs(value_at(bins)));
+  std::vector<double> color{tf.axis(tf.color.front().value), 0, tf.color.front().rgb.x, tf.color.front().rgb.y, tf.color.front().rgb.z};
+  for (std::size_t i = 1; i < tf.color.size(); ++i) {
+    const double x = tf.axis(tf.color[i].value);
+    const Vec3d step = tf.color[i].rgb - tf.color[i - 1].rgb;
+    color.insert(color.end(), {x, 1 / (x - tf.axis(tf.color[i - 1].value)), step.x, step.y, step.z});
   }
-  if (entries[3] > 0) visible[0] = kAlways;
-  return t;
+  uniforms.push_back({"u_extinction_points", extinction});
+  uniforms.push_back({"u_color_points", color});
+}
+
+void add_table(const TransferFunction& tf, double unit, SceneBindings& b) {
+  const double lower = tf.axis(std::min(tf.extinction.front().value, tf.color.front().value));
+  const double upper = tf.axis(std::max(tf.extinction.back().value, tf.color.back().value));
+  const double scale = upper > lower ? kTableBins / (upper - lower) : 1;
+  HostTexture table = make_buffer("transfer_table", TexelFormat::rgba32f, kTableBins + 1);
+  auto* entries = table.as<glm::vec4>();
+  for (int i = 0; i <= kTableBins; ++i) {
+    const double x = lower + i / scale;
+    const double v = tf.logarithmic ? std::pow(10.0, x) : x;
+    entries[i] = glm::vec4(Vec3f(tf.color_at(v)), static_cast<float>(std::min(tf.extinction_at(v) * unit, 1e30)));
+  }
+  b.uniforms.push_back({"u_transfer_axis", std::vector<double>{lower, scale}});
+  b.uniforms.push_back({"u_transfer_last", std::vector<int>{kTableBins}});
+  b.buffers.push_back(std::move(table));
+}
+
+/// Intervals of values without extinction, first and last value of each; a little inside of
+/// the true ones, by what the shader's own evaluation may be off (`margin`, on the axis).
+std::vector<double> invisible_ranges(const TransferFunction& tf, double margin) {
+  constexpr double kFar = 3e38;
+  const auto value = [&](double x) { return tf.logarithmic ? std::pow(10.0, x) : x; };
+  std::vector<double> ranges;
+  const auto& points = tf.extinction;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (points[i].extinction > 0) continue;
+    std::size_t last = i;
+    while (last + 1 < points.size() && !(points[last + 1].extinction > 0)) ++last;
+    const double from = i == 0 ? -kFar : value(tf.axis(points[i].value) + margin);
+    const double to = last + 1 == points.size() ? kFar : value(tf.axis(points[last].value) - (last == 0 && i == 0 ? 0 : margin));
+    if (from < to && ranges.size() < 2 * kMostInvisibleRanges) ranges.insert(ranges.end(), {from, to});
+    i = last;
+  }
+  return ranges;
 }
 
 std::vector<double> numbers(const Vec3d& v) { return {v.x, v.y, v.z}; }
@@ -135,6 +121,7 @@ UniformValues field_uniforms(const AmrHierarchy& h, const EncodedField& field) {
   UniformValues uniforms;
   uniforms.push_back({"u_domain_cells", std::vector<int>{n.x, n.y, n.z}});
   uniforms.push_back({"u_level_width", widths});
+  uniforms.push_back({"u_range_origin", std::vector<double>{field.range_origin}});
   uniforms.push_back({"u_value_scale", std::vector<double>{field.scale.offset, field.scale.scale}});
   for (const auto& [name, v] : field.integer_uniforms) uniforms.push_back({name, std::vector<int>{v.x, v.y, v.z}});
   return uniforms;
@@ -151,17 +138,34 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
   b.uniforms.push_back({"u_step", std::vector<double>{s.step}});
   b.uniforms.push_back({"u_early_end", std::vector<double>{1 - s.early_end.value_or(1)}});
   b.uniforms.push_back({"u_length_unit", std::vector<double>{unit}});
+  // modes without a transfer function declare points of which nothing is read
+  int extinction_points = 1;
+  int color_points = 1;
+  int invisible_count = 0;
   if (s.mode == Mode::dvr) {
-    const bool world = scene.transfer_function.length_unit == TransferFunction::LengthUnit::world;
-    TransferTable t = make_table(scene.transfer_function, world ? unit : unit / longest);
-    b.uniforms.push_back({"u_transfer_axis", std::vector<double>{t.lower, t.scale}});
-    b.uniforms.push_back({"u_transfer_last", std::vector<int>{t.last}});
-    b.transfer_exact = t.exact;
-    b.buffers.push_back(std::move(t.table));
-    b.buffers.push_back(std::move(t.next_visible));
+    const TransferFunction& tf = scene.transfer_function;
+    const double per_unit = tf.length_unit == TransferFunction::LengthUnit::world ? unit : unit / longest;
+    b.transfer_exact = std::max(tf.extinction.size(), tf.color.size()) <= kMostPoints;
+    if (b.transfer_exact) {
+      add_points(tf, per_unit, b.uniforms);
+      extinction_points = static_cast<int>(tf.extinction.size());
+      color_points = static_cast<int>(tf.color.size());
+    } else {
+      extinction_points = 0;
+      color_points = 0;
+      add_table(tf, per_unit, b);
+    }
+    const double span = tf.axis(tf.extinction.back().value) - tf.axis(tf.extinction.front().value);
+    const double margin = b.transfer_exact ? 1e-6 * (span + std::abs(tf.axis(tf.extinction.front().value))) : 1.01 * span / kTableBins;
+    const std::vector<double> invisible = invisible_ranges(tf, margin);
+    invisible_count = static_cast<int>(invisible.size() / 2);
+    if (invisible_count > 0) b.uniforms.push_back({"u_invisible_ranges", invisible});
   }
   b.defines = {{"AMRTEX_RAY_DOUBLE", needs_double_rays(h, scene) ? 1 : 0},
                {"AMRTEX_LOGARITHMIC", s.mode == Mode::dvr && scene.transfer_function.logarithmic ? 1 : 0},
+               {"AMRTEX_EXTINCTION_POINTS", extinction_points},
+               {"AMRTEX_COLOR_POINTS", color_points},
+               {"AMRTEX_INVISIBLE_RANGES", invisible_count},
                {"AMRTEX_MODE", static_cast<int>(s.mode)},
                {"AMRTEX_LATTICE", s.sampling == Sampling::lattice ? 1 : 0},
                {"AMRTEX_SKIP", s.skip ? 1 : 0},

@@ -14,8 +14,8 @@ namespace amrtex {
 struct SceneBindings {
   std::vector<std::pair<std::string, int>> defines;
   UniformValues uniforms;
-  std::vector<HostTexture> buffers;  ///< the transfer function's tables
-  bool transfer_exact = true;        ///< every point of the transfer function lies on an entry of the table
+  std::vector<HostTexture> buffers;  ///< the transfer function's tables, where it has too many points
+  bool transfer_exact = true;        ///< evaluated from its points; else from a table of 4096 bins
 };
 
 /// Uniforms of the contract alone (what probes need).

@@ -3,6 +3,10 @@
 #include "portable_glsl.h"
 
 uniform ivec3 u_domain_cells;
+struct Position {  // what ray.glsl needs of contract.glsl
+  ivec3 cell;
+  vec3 fraction;
+};
 #include "ray.glsl"
 
 uniform sampler3D tex_dense;

@@ -11,6 +11,9 @@
 #ifndef AMRTEX_POWER_OF_TWO
 #error AMRTEX_POWER_OF_TWO must be defined: 1 where all refinement ratios are powers of two, else 0
 #endif
+#ifndef AMRTEX_RATIO_SHIFT
+#error AMRTEX_RATIO_SHIFT must be defined: log2 of the refinement ratio where all levels have the same power of two, else 0
+#endif
 #ifndef AMRTEX_LEVELS
 #error AMRTEX_LEVELS must be defined: number of levels
 #endif
@@ -27,6 +30,7 @@
 DEFINE_INT(AMRTEX_FILTER)
 DEFINE_INT(AMRTEX_HARDWARE_FILTERING)
 DEFINE_INT(AMRTEX_POWER_OF_TWO)
+DEFINE_INT(AMRTEX_RATIO_SHIFT)
 DEFINE_INT(AMRTEX_LEVELS)
 DEFINE_INT(AMRTEX_VALIDITY)
 DEFINE_INT(AMRTEX_VALUE_RANGES)
@@ -38,6 +42,8 @@ DEFINE_INT(AMRTEX_SCALED_STORAGE)
 #define AMRTEX_FILTER_LINEAR_PAGE 2
 #define AMRTEX_FILTER_LINEAR_VERTEX 3
 #define AMRTEX_FILTER_BASIS 4
+
+#define AMRTEX_NO_RANGE 0xffffffffu  // coded range of a region without mesh
 
 STRUCT Position {
   ivec3 cell;      // of the finest level
@@ -53,6 +59,8 @@ STRUCT Region {
   int width;          // of its cells, in finest cells
   vec2r value_range;  // of every value that fetch_field can return here (AMRTEX_VALUE_RANGES)
   ivec4 handle;       // the encoding's own
+  vec3r texture_lower;  // the encoding's own: texture coordinate of q = 0 (hardware filtering) ...
+  vec3r texture_scale;  // ... and how much it grows with q
 };
 
 STRUCT FieldSample {
@@ -61,8 +69,15 @@ STRUCT FieldSample {
 };
 
 UNIFORM(ivec3, u_domain_cells)                // finest
+UNIFORM(real, u_range_origin)                 // what decode_range adds to
 UNIFORM(vec2r, u_value_scale)                 // a, b of scaled storage
 UNIFORM_ARRAY(int, u_level_width, AMRTEX_LEVELS, 64)  // cell width of each level, in finest cells
+
+// Cell width of a level, in finest cells.
+int level_width(IN(int) level) {
+  if (AMRTEX_RATIO_SHIFT != 0) return 1 << (AMRTEX_RATIO_SHIFT * (AMRTEX_LEVELS - 1 - level));
+  return u_level_width[level];
+}
 
 // Division of a cell index by the cell width of a level, towards minus infinity.
 ivec3 divide_by_width(IN(ivec3) cell, IN(int) width) {
@@ -75,6 +90,12 @@ ivec3 divide_by_width(IN(ivec3) cell, IN(int) width) {
 real decode_value(IN(real) code) {
   if (AMRTEX_SCALED_STORAGE == 0) return code;
   return u_value_scale.x + u_value_scale.y * code;
+}
+
+// A value range as encodings store it: distances of minimum and maximum from the field's
+// minimum, rounded outwards to the upper halves of floats (structures/build_tools.hpp).
+vec2r decode_range(IN(uint) code) {
+  return vec2r(u_range_origin + as_real(code << 16u), u_range_origin + as_real(code & 0xffff0000u));
 }
 
 // Trilinear interpolation; v[i] belongs to corner (i & 1, (i >> 1) & 1, i >> 2). Written
@@ -96,12 +117,20 @@ bool region_contains(IN(Region) r, IN(ivec3) cell) {
   return all(greaterThanEqual(cell, r.lower)) && all(lessThan(cell, r.upper));
 }
 
-// Where a position lies in a region: q, in cell widths of r from its lower corner.
+// Largest number below 1.
+#if AMRTEX_CPP
+#define AMRTEX_BELOW_ONE (real(1) - std::numeric_limits<real>::epsilon() / real(2))
+#else
+#define AMRTEX_BELOW_ONE 0.99999994
+#endif
+
+// Where a position lies in a region: q, in cell widths of r from its lower corner. Rounding
+// never carries it through the upper face of its cell: floor(q) is that cell.
 vec3r region_position(IN(Region) r, IN(Position) p) {
   ivec3 from_corner = p.cell - r.lower;
   ivec3 whole = divide_by_width(from_corner, r.width);
   PRECISE vec3r rest = (vec3r(from_corner - whole * r.width) + p.fraction) / real(r.width);
-  PRECISE vec3r q = vec3r(whole) + rest;
+  PRECISE vec3r q = min(vec3r(whole) + rest, vec3r(whole + ivec3(1)) * AMRTEX_BELOW_ONE);
   return q;
 }
 
@@ -110,6 +139,7 @@ bool sample_field(IN(Position) p, OUT(FieldSample) s) {
   Region r;
   s.value = real(0);
   s.level = -1;
+  if (any(lessThan(p.cell, ivec3(0))) || any(greaterThanEqual(p.cell, u_domain_cells))) return false;
   if (!locate(p, r)) return false;
   s.value = fetch_field(r, region_position(r, p));
   s.level = r.level;

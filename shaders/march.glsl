@@ -21,6 +21,7 @@ DEFINE_INT(AMRTEX_LATTICE)
 DEFINE_INT(AMRTEX_SKIP)
 DEFINE_INT(AMRTEX_EARLY_END)
 DEFINE_INT(AMRTEX_COUNT)
+DEFINE_INT(AMRTEX_RAY_DOUBLE)
 
 // the same numbers as enum class Mode (renderers/scene.hpp)
 #define AMRTEX_MODE_DVR 0
@@ -104,17 +105,16 @@ void count_region(INOUT(Accumulation) a, IN(bool) skipped) {
 
 // ---- lattice: sample k of a ray lies at the middle of [k, k + 1) steps from the entry,
 // a position that depends on the ray and k alone. Positions are anchored anew every
-// AMRTEX_BLOCK samples and lie on a grid of 2^-12 of a cell, so that sums of cell and
+// AMRTEX_BLOCK samples and lie on a grid of 2^-12 of a finest cell, so that sums of cell and
 // fraction are exact and encodings with other regions see the same bits.
 #define AMRTEX_BLOCK 256
-#define AMRTEX_QUANTUM real(4096)
+#define AMRTEX_QUANTA real(4096)
+#define AMRTEX_QUANTUM real(0.000244140625)
 
 STRUCT LatticeBlock {
-  ivec3 cell;       // anchor: finest cell ...
-  vec3r fraction;   // ... and fraction
-  vec3r step;       // finest cells a sample
-  real last;        // middle of the ray's last interval, in samples from the block's first
-  real end;         // the ray's exit, likewise
+  ivec3 cell;      // anchor: finest cell ...
+  vec3r fraction;  // ... and fraction, in quanta
+  vec3r step;      // quanta a sample
 };
 
 LatticeBlock lattice_block(IN(Ray) ray, IN(int) first) {
@@ -122,111 +122,161 @@ LatticeBlock lattice_block(IN(Ray) ray, IN(int) first) {
   ray_real t = ray_real(u_step) * ray_real(first);
   Position anchor = make_position(ray.entry + ray.direction * t);
   block.cell = anchor.cell;
-  block.fraction = anchor.fraction;
-  block.step = vec3r(ray.direction) * u_step;
-  block.end = real((ray.length - t) / ray_real(u_step));
-  real whole = ceil(block.end) - real(1);
-  block.last = (whole + block.end) * real(0.5);
+  block.fraction = anchor.fraction * AMRTEX_QUANTA;
+  block.step = vec3r(ray.direction) * (u_step * AMRTEX_QUANTA);
   return block;
 }
 
-// Offset of sample i of the block from its anchor cell, in finest cells.
+// Offset of sample i of the block from its anchor cell, in whole quanta.
 vec3r lattice_offset(IN(LatticeBlock) block, IN(real) i) {
-  PRECISE vec3r way = block.step * min(i + real(0.5), block.last);
-  PRECISE vec3r offset = floor((block.fraction + way) * AMRTEX_QUANTUM) / AMRTEX_QUANTUM;
+  PRECISE vec3r way = block.step * (i + real(0.5));
+  PRECISE vec3r offset = floor(block.fraction + way);
   return offset;
 }
 
 ivec3 lattice_cell(IN(LatticeBlock) block, IN(real) i) {
-  return clamp(block.cell + ivec3(floor(lattice_offset(block, i))), ivec3(0), u_domain_cells - ivec3(1));
+  return clamp(block.cell + ivec3(floor(lattice_offset(block, i) * AMRTEX_QUANTUM)), ivec3(0), u_domain_cells - ivec3(1));
 }
 
 // First sample after i of the block that lies outside the region, at most `count`.
-int lattice_exit(IN(LatticeBlock) block, IN(Region) r, IN(int) i, IN(int) count) {
-  vec3r to_lower = vec3r(r.lower - block.cell) - block.fraction;
-  vec3r to_upper = vec3r(r.upper - block.cell) - block.fraction;
-  real exit = real(count);
-  for (int axis = 0; axis < 3; ++axis) {
-    real d = block.step[axis];
-    if (d > real(0)) exit = min(exit, to_upper[axis] / d);
-    if (d < real(0)) exit = min(exit, to_lower[axis] / d);
-  }
+int lattice_exit(IN(LatticeBlock) block, IN(vec3r) inverse_step, IN(Region) r, IN(int) i, IN(int) count) {
+  vec3r to_lower = (vec3r(r.lower - block.cell) * AMRTEX_QUANTA - block.fraction) * inverse_step;
+  vec3r to_upper = (vec3r(r.upper - block.cell) * AMRTEX_QUANTA - block.fraction) * inverse_step;
+  vec3r far = max(to_lower, to_upper);
+  real exit = min(min(far.x, far.y), min(far.z, real(count)));
   int next = clamp(int(ceil(exit - real(0.5))), i + 1, count);
   // the division rounds; the samples' own cells decide
-  if (next > i + 1 && !region_contains(r, lattice_cell(block, real(next - 1)))) next -= 1;
-  else if (next < count && region_contains(r, lattice_cell(block, real(next)))) next += 1;
-  return next;
+  bool too_far = next > i + 1 && !region_contains(r, lattice_cell(block, real(next - 1)));
+  bool too_near = next < count && region_contains(r, lattice_cell(block, real(next)));
+  return next + (too_near ? 1 : 0) - (too_far ? 1 : 0);
+}
+
+// q of a sample is offset * scale + corner.
+STRUCT LatticeFrame {
+  vec3r corner;  // cell widths of the region: its samples' q at offset 0, plus half a quantum
+  real scale;    // cell widths of the region a quantum
+};
+
+LatticeFrame lattice_frame(IN(LatticeBlock) block, IN(Region) r) {
+  ivec3 from_corner = block.cell - r.lower;
+  LatticeFrame frame;
+#if AMRTEX_CPP || !AMRTEX_RAY_DOUBLE
+  // at most 2048 finest cells: every sum below and in lattice_q is exact
+  if (AMRTEX_RAY_DOUBLE == 0) {
+    real inverse_width = real(1) / real(r.width);
+    frame.scale = AMRTEX_QUANTUM * inverse_width;
+    frame.corner = (vec3r(from_corner) + real(0.5) * AMRTEX_QUANTUM) * inverse_width;
+    return frame;
+  }
+#endif
+  frame.corner = vec3r(divide_by_width(from_corner, r.width));
+  frame.scale = real(1) / real(r.width);
+  return frame;
+}
+
+vec3r lattice_q(IN(LatticeBlock) block, IN(LatticeFrame) frame, IN(Region) r, IN(real) i) {
+  vec3r offset = lattice_offset(block, i);
+#if AMRTEX_CPP || !AMRTEX_RAY_DOUBLE
+  if (AMRTEX_RAY_DOUBLE == 0) {
+    PRECISE vec3r q = offset * frame.scale + frame.corner;
+    return q;
+  }
+#endif
+  // large domains: positions are rounded once more, to 2^-12 of the region's own cells
+  ivec3 from_corner = block.cell - r.lower;
+  vec3r rest = vec3r(from_corner - divide_by_width(from_corner, r.width) * r.width);
+  PRECISE vec3r in_cells = (rest + offset * AMRTEX_QUANTUM) * frame.scale;
+  PRECISE vec3r q_large = frame.corner + (floor(in_cells * AMRTEX_QUANTA) + real(0.5)) * AMRTEX_QUANTUM;
+  return q_large;
 }
 
 void march_lattice_region(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(Region) r, IN(int) first, IN(int) next) {
-  ivec3 from_corner = block.cell - r.lower;
-  ivec3 whole = divide_by_width(from_corner, r.width);
-  vec3r rest = vec3r(from_corner - whole * r.width);
-  vec3r corner = vec3r(whole);
-  real inverse_width = real(1) / real(r.width);
+  LatticeFrame frame = lattice_frame(block, r);
   real i = real(first);
   real end = real(next);
   if (i < end) {
     do {
-      PRECISE vec3r in_cells = (rest + lattice_offset(block, i)) * inverse_width;
-      PRECISE vec3r q = corner + (floor(in_cells * AMRTEX_QUANTUM) + real(0.5)) / AMRTEX_QUANTUM;
-      take_sample(a, r, q, u_step * min(real(1), block.end - i));
+      take_sample(a, r, lattice_q(block, frame, r, i), u_step);
       i += real(1);
     } while (i < end && !ray_ended(a));
   }
 }
 
-void march_lattice(IN(Ray) ray, INOUT(Accumulation) a) {
-  int samples = max(int(ceil(ray.length / ray_real(u_step))), 1);
-  int k = 0;
-  int block_first = -AMRTEX_BLOCK;
-  LatticeBlock block;
-  while (k < samples && !ray_ended(a)) {
-    if (k >= block_first + AMRTEX_BLOCK) {
-      block_first = k - k % AMRTEX_BLOCK;
-      block = lattice_block(ray, block_first);
-    }
-    int i = k - block_first;
-    int count = min(samples - block_first, AMRTEX_BLOCK);
-    Position p;
-    vec3r offset = lattice_offset(block, real(i));
-    p.cell = lattice_cell(block, real(i));
-    p.fraction = offset - floor(offset);
-    Region r;
-    bool inside = locate(p, r);
-    int next = lattice_exit(block, r, i, count);
-    bool skipped = !inside || region_invisible(a, r);
-    count_region(a, skipped);
-    if (!skipped) march_lattice_region(a, block, r, i, next);
-    k = block_first + next;
+// 1 / v without infinities: a ray along a face never ends a region through it.
+vec3r safe_inverse(IN(vec3r) v) {
+  vec3r tiny = vec3r(equal(v, vec3r(0))) * real(1e-20);
+  return real(1) / (v + tiny);
+}
+
+void march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) count) {
+  vec3r inverse_step = safe_inverse(block.step);
+  int i = 0;
+  if (i < count) {
+    do {
+      Region r;
+      int first = i;
+      bool skipped = true;
+      do {  // the next region that can be seen: all lanes of a SIMD group then sample together
+        first = i;
+        Position p;
+        vec3r offset = lattice_offset(block, real(i)) * AMRTEX_QUANTUM;
+        p.cell = clamp(block.cell + ivec3(floor(offset)), ivec3(0), u_domain_cells - ivec3(1));
+        p.fraction = offset - floor(offset);
+        bool inside = locate(p, r);
+        i = lattice_exit(block, inverse_step, r, i, count);
+        skipped = !inside || region_invisible(a, r);
+        count_region(a, skipped);
+      } while (skipped && i < count);
+      if (!skipped) march_lattice_region(a, block, r, first, i);
+    } while (i < count && !ray_ended(a));
   }
+}
+
+// The interval that is left after `whole` full ones.
+void march_lattice_rest(INOUT(Accumulation) a, IN(Ray) ray, IN(int) whole) {
+  ray_real start = ray_real(u_step) * ray_real(whole);
+  real length = real(ray.length - start);
+  LatticeBlock block;
+  Position p = make_position(ray.entry + ray.direction * ((start + ray.length) * ray_real(0.5)));
+  block.cell = p.cell;
+  block.fraction = p.fraction * AMRTEX_QUANTA;
+  block.step = vec3r(0);
+  Region r;
+  bool inside = locate(p, r);
+  bool skipped = !inside || region_invisible(a, r) || !(length > real(0));
+  count_region(a, skipped);
+  if (!skipped) take_sample(a, r, lattice_q(block, lattice_frame(block, r), r, real(0)), length);
+}
+
+// Three nested loops (blocks, regions, samples): what is computed in an inner one is paid
+// by every lane of a SIMD group at every turn.
+void march_lattice(IN(Ray) ray, INOUT(Accumulation) a) {
+  int whole = int(floor(ray.length / ray_real(u_step)));
+  int first = 0;
+  if (first < whole) {
+    do {
+      march_lattice_block(a, lattice_block(ray, first), min(whole - first, AMRTEX_BLOCK));
+      first += AMRTEX_BLOCK;
+    } while (first < whole && !ray_ended(a));
+  }
+  if (!ray_ended(a)) march_lattice_rest(a, ray, whole);
 }
 
 // ---- adaptive: each region is divided into equal intervals of at most `step` of its own cells.
 
-// Length to the region's exit from f (finest cells from its lower corner) and the axis of that exit.
-real region_exit(IN(vec3r) f, IN(vec3r) size, IN(vec3r) direction, OUT(int) exit_axis) {
-  real exit = real(3e38);
-  exit_axis = -1;
+// The ray's next position after it left region r through the axis that `through` marks.
+Position leave_region(IN(Ray) ray, IN(Region) r, IN(ray_real) t, IN(bvec3) through) {
+  ray_vec3 at = ray.entry + ray.direction * t;
+  // rounding must not carry it through another face
+  ray_vec3 whole = clamp(floor(at), ray_vec3(r.lower), ray_vec3(r.upper - ivec3(1)));
+  Position p;
+  p.cell = ivec3(whole);
+  p.fraction = clamp(vec3r(at - whole), vec3r(0), vec3r(AMRTEX_BELOW_ONE));
   for (int axis = 0; axis < 3; ++axis) {
-    real d = direction[axis];
-    if (d == real(0)) continue;
-    real t = ((d > real(0) ? size[axis] : real(0)) - f[axis]) / d;
-    if (t < exit) {
-      exit = t;
-      exit_axis = axis;
-    }
+    bool forward = ray.direction[axis] > ray_real(0);
+    p.cell[axis] = through[axis] ? (forward ? r.upper[axis] : r.lower[axis] - 1) : p.cell[axis];
+    p.fraction[axis] = through[axis] ? (forward ? real(0) : real(AMRTEX_BELOW_ONE)) : p.fraction[axis];
   }
-  return max(exit, real(0));
-}
-
-// The ray's next position after it left region r through `axis`.
-Position leave_region(IN(Ray) ray, IN(Region) r, IN(ray_real) t, IN(int) axis) {
-  Position p = make_position(ray.entry + ray.direction * t);
-  p.cell = clamp(p.cell, r.lower, r.upper - ivec3(1));  // rounding must not carry it through another face
-  bool forward = ray.direction[axis] > ray_real(0);
-  p.cell[axis] = forward ? r.upper[axis] : r.lower[axis] - 1;
-  p.fraction[axis] = forward ? real(0) : real(0.99999994);
   return p;
 }
 
@@ -246,28 +296,34 @@ void march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(
 }
 
 void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a) {
-  ray_real t = ray_real(0);
   vec3r direction = vec3r(ray.direction);
+  vec3r inverse = safe_inverse(direction);
+  ray_real t = ray_real(0);
   Position p = make_position(ray.entry);
   bool more = true;
-  while (more && !ray_ended(a)) {
+  do {
     Region r;
-    bool inside = locate(p, r);
-    vec3r f = vec3r(p.cell - r.lower) + p.fraction;
-    int axis = -1;
-    real length = region_exit(f, vec3r(r.upper - r.lower), direction, axis);
-    ray_real next = t + ray_real(length);
-    more = axis >= 0 && next < ray.length;
-    if (!more) length = real(max(ray.length - t, ray_real(0)));
-    bool skipped = !inside || region_invisible(a, r);
-    count_region(a, skipped);
+    vec3r f = vec3r(0);
+    real length = real(0);
+    bool skipped = true;
+    do {  // the next region that can be seen: all lanes of a SIMD group then sample together
+      bool inside = locate(p, r);
+      f = vec3r(p.cell - r.lower) + p.fraction;
+      vec3r exits = max(-f * inverse, (vec3r(r.upper - r.lower) - f) * inverse);
+      length = max(min(exits.x, min(exits.y, exits.z)), real(0));
+      ray_real next = t + ray_real(length);
+      more = next < ray.length;
+      if (!more) length = real(max(ray.length - t, ray_real(0)));
+      skipped = !inside || region_invisible(a, r);
+      count_region(a, skipped);
+      t = next;
+      bool x = exits.x <= min(exits.y, exits.z);
+      bool y = !x && exits.y <= exits.z;
+      p = leave_region(ray, r, t, bvec3(x, y, !x && !y));
+      more = more && all(greaterThanEqual(p.cell, ivec3(0))) && all(lessThan(p.cell, u_domain_cells));
+    } while (skipped && more);
     if (!skipped && length > real(0)) march_adaptive_region(a, r, f, direction, length);
-    t = next;
-    if (more) {
-      p = leave_region(ray, r, t, axis);
-      more = p.cell[axis] >= 0 && p.cell[axis] < u_domain_cells[axis];
-    }
-  }
+  } while (more && !ray_ended(a));
 }
 
 // The picture's value for one ray: premultiplied RGBA, or (value, 0, 0, 1).

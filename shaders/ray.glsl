@@ -56,6 +56,6 @@ Position make_position(IN(ray_vec3) p) {
   ray_vec3 last = ray_vec3(u_domain_cells - ivec3(1));
   ray_vec3 whole = clamp(floor(p), ray_vec3(0), last);
   position.cell = ivec3(whole);
-  position.fraction = clamp(vec3r(p - whole), vec3r(0), vec3r(0.99999994));
+  position.fraction = clamp(vec3r(p - whole), vec3r(0), vec3r(AMRTEX_BELOW_ONE));
   return position;
 }

@@ -1,36 +1,94 @@
-// Value -> emitted colour and extinction, from a table that is piecewise linear over
-// the value (or its log10). The host places the table's entries on the points of the
-// transfer function wherever their spacing allows, so that the table is exact.
+// Value -> emitted colour and extinction, both piecewise linear over the value or its log10.
+// Few points are evaluated as they are: exact for any spacing, and cheaper than a look-up
+// where gathers are slow. Many points come from a table of evenly spaced entries.
 #if !AMRTEX_CPP
 #ifndef AMRTEX_LOGARITHMIC
-#error AMRTEX_LOGARITHMIC must be defined: 1 where the table is over log10(value), else 0
+#error AMRTEX_LOGARITHMIC must be defined: 1 where the points are joined over log10(value), else 0
+#endif
+#ifndef AMRTEX_EXTINCTION_POINTS
+#error AMRTEX_EXTINCTION_POINTS must be defined: how many points extinction has; 0 for the table
+#endif
+#ifndef AMRTEX_COLOR_POINTS
+#error AMRTEX_COLOR_POINTS must be defined: how many points colour has; 0 for the table
+#endif
+#ifndef AMRTEX_INVISIBLE_RANGES
+#error AMRTEX_INVISIBLE_RANGES must be defined: how many intervals of values have no extinction
 #endif
 #endif
+DEFINE_INT(AMRTEX_INVISIBLE_RANGES)
 DEFINE_INT(AMRTEX_LOGARITHMIC)
+DEFINE_INT(AMRTEX_EXTINCTION_POINTS)
+DEFINE_INT(AMRTEX_COLOR_POINTS)
 
-BUFFER(vec4r, transfer_table, transfer_table_block)         // rgb, extinction per unit of ray length
-BUFFER(real, transfer_next_visible, transfer_next_visible_block)   // entry i: smallest visible value of bins i and above (a large number when none)
-UNIFORM(vec2r, u_transfer_axis)       // table position = (axis value - x) * y
-UNIFORM(int, u_transfer_last)         // index of the table's last entry, at least 1
+#if AMRTEX_CPP || AMRTEX_INVISIBLE_RANGES > 0
+UNIFORM_ARRAY(real, u_invisible_ranges, 2 * AMRTEX_INVISIBLE_RANGES, 16)  // first and last value of each
+#endif
 
-real transfer_position(IN(real) value) {
-  real x = value;
-  if (AMRTEX_LOGARITHMIC != 0) x = log2(max(value, real(1e-37))) * real(0.30102999566398119521);
-  return clamp((x - u_transfer_axis.x) * u_transfer_axis.y, real(0), real(u_transfer_last));
+// The value, or its log10: where the points stand.
+real transfer_axis(IN(real) value) {
+  if (AMRTEX_LOGARITHMIC == 0) return value;
+  return log2(max(value, real(1e-37))) * real(0.30102999566398119521);
 }
+
+#if AMRTEX_CPP || AMRTEX_EXTINCTION_POINTS > 0
+UNIFORM_ARRAY(real, u_extinction_points, 3 * AMRTEX_EXTINCTION_POINTS, 48)  // axis value, extinction, slope to the next point
+UNIFORM_ARRAY(real, u_color_points, 5 * AMRTEX_COLOR_POINTS, 80)            // axis value, 1 / distance from the one before, rgb less that one's
+
+// Extinction per unit of ray length. A segment's end is replaced by the next one's beginning,
+// so that between two points of extinction 0 it is exactly 0.
+real points_extinction(IN(real) x) {
+  real kappa = u_extinction_points[1];
+  for (int i = 0; i < AMRTEX_EXTINCTION_POINTS; ++i) {
+    real way = x - u_extinction_points[3 * i];
+    kappa = way > real(0) ? u_extinction_points[3 * i + 1] + u_extinction_points[3 * i + 2] * way : kappa;
+  }
+  return kappa;
+}
+
+vec3r points_color(IN(real) x) {
+  vec3r rgb = vec3r(u_color_points[2], u_color_points[3], u_color_points[4]);
+  for (int i = 1; i < AMRTEX_COLOR_POINTS; ++i) {
+    real done = clamp((x - u_color_points[5 * i]) * u_color_points[5 * i + 1] + real(1), real(0), real(1));
+    rgb += vec3r(u_color_points[5 * i + 2], u_color_points[5 * i + 3], u_color_points[5 * i + 4]) * done;
+  }
+  return rgb;
+}
+#endif
+
+#if AMRTEX_CPP || AMRTEX_EXTINCTION_POINTS == 0
+BUFFER(vec4r, transfer_table, transfer_table_block)  // rgb, extinction per unit of ray length
+UNIFORM(vec2r, u_transfer_axis)                      // table position = (axis value - x) * y
+UNIFORM(int, u_transfer_last)                        // index of the table's last entry, at least 1
+
+real table_position(IN(real) x) { return clamp((x - u_transfer_axis.x) * u_transfer_axis.y, real(0), real(u_transfer_last)); }
+
+vec4r table_transfer(IN(real) axis_value) {
+  real x = table_position(axis_value);
+  int i = min(int(x), u_transfer_last - 1);
+  vec4r low = transfer_table[i];
+  vec4r high = transfer_table[i + 1];
+  return low + (high - low) * (x - real(i));
+}
+#endif
 
 // rgb, extinction
 vec4r transfer(IN(real) value) {
-  real x = transfer_position(value);
-  int i = min(int(x), u_transfer_last - 1);
-  real f = x - real(i);
-  vec4r low = transfer_table[i];
-  vec4r high = transfer_table[i + 1];
-  return low + (high - low) * f;
+  real x = transfer_axis(value);
+#if AMRTEX_CPP || AMRTEX_EXTINCTION_POINTS > 0
+  if (AMRTEX_EXTINCTION_POINTS > 0) return vec4r(points_color(x), points_extinction(x));
+#endif
+#if AMRTEX_CPP || AMRTEX_EXTINCTION_POINTS == 0
+  return table_transfer(x);
+#endif
 }
 
-// May any value of the range have an extinction above 0? Conservative.
+// May any value of the range have an extinction above 0? Conservative: the host lists
+// intervals of values in which every extinction is 0.
 bool transfer_visible(IN(vec2r) value_range) {
-  int i = min(int(transfer_position(value_range.x)), u_transfer_last);
-  return transfer_next_visible[i] <= value_range.y;
+  bool visible = true;
+#if AMRTEX_CPP || AMRTEX_INVISIBLE_RANGES > 0
+  for (int i = 0; i < AMRTEX_INVISIBLE_RANGES; ++i)
+    visible = visible && !(value_range.x >= u_invisible_ranges[2 * i] && value_range.y <= u_invisible_ranges[2 * i + 1]);
+#endif
+  return visible;
 }

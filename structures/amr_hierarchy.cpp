@@ -95,7 +95,7 @@ struct AmrHierarchy::Data {
   std::vector<PatchIndex> index;                             // a level
   std::vector<std::vector<std::vector<std::uint8_t>>> leaf;  // level, patch, cell
   // level, patch, field, cell: share of a refined cell that has a value; only where it is not 0 or 1 for some cell
-  std::vector<std::vector<std::vector<std::vector<float>>>> weight;
+  std::vector<std::vector<std::vector<std::vector<double>>>> weight;
   std::vector<std::int64_t> leaves;  // a level
   std::vector<FieldStatistics> statistics;
   bool holes = false;
@@ -249,14 +249,14 @@ void AmrHierarchy::Data::restrict_patch(int level, std::size_t k, std::size_t fi
   Patch& patch = patches(level)[k];
   const auto& mask = leaf[static_cast<std::size_t>(level)][k];
   auto& values = patch.values[field];
-  std::vector<float> shares;
+  std::vector<double> shares;
   const int r = ratio(level, level + 1);
   const double share = 1.0 / (static_cast<double>(r) * r * r);
   const auto put = [&](std::size_t i, const Mean& mean) {
     values[i] = mean.weight > 0 ? mean.sum / mean.weight : std::numeric_limits<double>::quiet_NaN();
     if (mean.weight > 0 && mean.weight < 1 - 1e-9) {
-      if (shares.empty()) shares.assign(values.size(), 1.0F);
-      shares[i] = static_cast<float>(mean.weight);
+      if (shares.empty()) shares.assign(values.size(), 1.0);
+      shares[i] = mean.weight;
     }
   };
   std::vector<std::uint8_t> done;
@@ -270,7 +270,7 @@ void AmrHierarchy::Data::restrict_patch(int level, std::size_t k, std::size_t fi
       for_each_cell(Box{cell, cell + Vec3i(1)}.refined(r), [&](const Vec3i& child) {
         const std::size_t j = fine.box.offset(child);
         if (std::isnan(fine_values[j])) return;
-        const double w = fine_shares.empty() ? share : share * static_cast<double>(fine_shares[j]);
+        const double w = fine_shares.empty() ? share : share * fine_shares[j];
         mean.sum += fine_values[j] * w;
         mean.weight += w;
       });
@@ -287,7 +287,7 @@ void AmrHierarchy::Data::restrict_patch(int level, std::size_t k, std::size_t fi
 }
 
 void AmrHierarchy::Data::restrict_level(int level) {
-  weight[static_cast<std::size_t>(level)].assign(patches(level).size(), std::vector<std::vector<float>>(mesh.fields.size()));
+  weight[static_cast<std::size_t>(level)].assign(patches(level).size(), std::vector<std::vector<double>>(mesh.fields.size()));
   if (level + 1 == levels()) return;
   tbb::parallel_for(std::size_t{0}, patches(level).size(), [&](std::size_t k) {
     for (std::size_t field = 0; field < mesh.fields.size(); ++field) restrict_patch(level, k, field);

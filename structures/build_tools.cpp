@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <bit>
 #include <cmath>
 
 namespace amrtex {
@@ -16,22 +17,35 @@ void ValueRange::add(double value) {
   }
 }
 
-void store_range(ValueRange range, Storage storage, StorageScale scale, float* out) {
-  if (range.empty()) {
-    out[0] = 1;
-    out[1] = -1;
-    return;
-  }
-  // what the shader decodes may lie half a code away, and one rounding further
-  double slack = 0;
-  if (storage == Storage::r8) slack = scale.scale * (0.51 / 255);
-  if (storage == Storage::r16) slack = scale.scale * (0.51 / 65535);
-  if (storage == Storage::r16f) slack = scale.scale * std::ldexp(1.0, -11);
-  slack += 4e-7 * std::max({std::abs(range.min), std::abs(range.max), storage == Storage::r32f ? 0.0 : std::abs(scale.scale)});
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  const bool exact = storage == Storage::r32f && range.min == range.max && static_cast<double>(static_cast<float>(range.min)) == range.min;
-  out[0] = exact ? static_cast<float>(range.min) : std::nextafter(static_cast<float>(range.min - slack), -kInfinity);
-  out[1] = exact ? static_cast<float>(range.max) : std::nextafter(static_cast<float>(range.max + slack), kInfinity);
+namespace {
+
+/// How far a decoded value may lie from the one that was stored.
+double storage_slack(Storage storage, StorageScale scale, double largest) {
+  double slack = 4e-7 * std::max(largest, storage == Storage::r32f ? 0.0 : std::abs(scale.scale));
+  if (storage == Storage::r8) slack += scale.scale * (0.51 / 255);
+  if (storage == Storage::r16) slack += scale.scale * (0.51 / 65535);
+  if (storage == Storage::r16f) slack += scale.scale * std::ldexp(1.0, -11);
+  return slack;
+}
+
+}  // namespace
+
+double range_origin(const FieldStatistics& s, Storage storage, StorageScale scale) {
+  if (std::isnan(s.min)) return 0;
+  const double lowest = s.min - storage_slack(storage, scale, std::max(std::abs(s.min), std::abs(s.max)));
+  return static_cast<double>(std::nextafter(static_cast<float>(lowest), -std::numeric_limits<float>::infinity()));
+}
+
+std::uint32_t encode_range(ValueRange range, double origin, Storage storage, StorageScale scale) {
+  if (range.empty()) return kNoRange;
+  const double slack = storage_slack(storage, scale, std::max(std::abs(range.min), std::abs(range.max)));
+  // one part in 2^20 for the shader's own sum of origin and distance
+  const double margin = slack + std::ldexp(std::abs(origin), -20);
+  const auto low = static_cast<float>(std::max(range.min - margin - origin, 0.0) * (1 - 1e-6));
+  const auto high = static_cast<float>((range.max + margin - origin) * (1 + 1e-6));
+  const std::uint32_t below = std::bit_cast<std::uint32_t>(low) >> 16;
+  const std::uint32_t above = (std::bit_cast<std::uint32_t>(high) + 0xffffU) >> 16;
+  return below | (std::min(above, 0x7f80U) << 16);
 }
 
 void store_values(Storage storage, StorageScale scale, const double* values, std::size_t count, std::byte* data, std::size_t first) {
@@ -69,6 +83,19 @@ bool power_of_two_ratios(const AmrHierarchy& hierarchy) {
   return true;
 }
 
+namespace {
+
+/// log2 of the ratio where all levels have the same power of two; 0 otherwise.
+int common_ratio_shift(const AmrHierarchy& hierarchy) {
+  if (hierarchy.finest_level() == 0) return 1;  // there is no ratio; any will do
+  const auto r = static_cast<unsigned>(hierarchy.ratio_to_finer(0));
+  for (int l = 1; l < hierarchy.finest_level(); ++l)
+    if (static_cast<unsigned>(hierarchy.ratio_to_finer(l)) != r) return 0;
+  return std::has_single_bit(r) ? std::countr_zero(r) : 0;
+}
+
+}  // namespace
+
 EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request, const Json& parameters) {
   EncodedField field;
   const bool linear = request.needs.filter != Filter::nearest;
@@ -81,10 +108,12 @@ EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy
   field.scale = storage_scale(request.storage, s.min, s.max);
   const bool validity = hierarchy.has_missing(request.field);
   const bool scaled = request.storage != Storage::r32f && request.storage != Storage::r64f;
+  field.range_origin = range_origin(s, request.storage, field.scale);
   field.shader.file = fmt::format("{0}/{0}.glsl", encoding.name());
   field.shader.defines = {{"AMRTEX_FILTER", static_cast<int>(request.needs.filter)},
                           {"AMRTEX_HARDWARE_FILTERING", field.filtering == Filtering::hardware ? 1 : 0},
                           {"AMRTEX_POWER_OF_TWO", power_of_two_ratios(hierarchy) ? 1 : 0},
+                          {"AMRTEX_RATIO_SHIFT", common_ratio_shift(hierarchy)},
                           {"AMRTEX_LEVELS", hierarchy.level_count()},
                           {"AMRTEX_VALIDITY", validity ? 1 : 0},
                           {"AMRTEX_VALUE_RANGES", request.needs.value_ranges ? 1 : 0},
@@ -94,7 +123,10 @@ EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy
 
 int integer_parameter(const Encoding& encoding, const Json& parameters, std::string_view name) {
   const Json& value = parameters.at(std::string(name));
-  if (value.is_number_integer()) return value.get<int>();
+  if (value.is_number_integer()) {
+    const auto wide = value.get<std::int64_t>();
+    if (wide == static_cast<int>(wide)) return static_cast<int>(wide);
+  }
   for (const ParameterInfo& p : encoding.parameters())
     if (p.name == name)
       throw UsageError(fmt::format("encoding {}: parameter {} is {}; accepted: {}", encoding.name(), name, value.dump(), p.accepted));

@@ -18,9 +18,17 @@ struct ValueRange {
   bool operator==(const ValueRange&) const = default;
 };
 
-/// The range as two floats, rounded outwards, after the values were stored with the given
-/// format: what skipping may rely on.
-void store_range(ValueRange range, Storage storage, StorageScale scale, float* out);
+/// Code of a range that holds no value: no mesh.
+inline constexpr std::uint32_t kNoRange = 0xffffffffU;
+
+/// What ranges are relative to: at most every value that the shader can return.
+double range_origin(const FieldStatistics& statistics, Storage storage, StorageScale scale);
+
+/// The range of everything that fetch_field may return for values stored in this format, in
+/// 32 bits: distances of minimum (lower half) and maximum (upper half) from the origin as the
+/// upper halves of floats, rounded outwards. 8 bits of mantissa and of exponent, so that
+/// skipping works for fields of any magnitude. decode_range() in contract.glsl reads it.
+std::uint32_t encode_range(ValueRange range, double origin, Storage storage, StorageScale scale);
 
 /// Stores `count` values side by side from texel `first`; NaN is stored as 0.
 void store_values(Storage storage, StorageScale scale, const double* values, std::size_t count, std::byte* data, std::size_t first);

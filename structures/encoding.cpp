@@ -106,6 +106,7 @@ Json complete_parameters(const Encoding& encoding, const Json& given) {
                                    known.empty() ? "none" : join_names(known, [](const ParameterInfo& p) { return p.name; })));
   Json complete = Json::object();
   for (const ParameterInfo& p : known) complete[p.name] = given.contains(p.name) ? given[p.name] : p.default_value;
+  encoding.check_parameters(complete);
   return complete;
 }
 

@@ -84,6 +84,7 @@ struct EncodedField {
   Filtering filtering = Filtering::manual;
   Storage storage = Storage::r32f;
   StorageScale scale;
+  double range_origin = 0;               ///< what coded value ranges are relative to (build_tools.hpp)
   ShaderPart shader;
   std::vector<HostTexture> textures;
   std::vector<std::pair<std::string, Vec3i>> integer_uniforms;  ///< ivec3 uniforms of the encoding's GLSL
@@ -116,6 +117,8 @@ class Encoding {
   /// The filters of this encoding under some parameters (for tables and messages).
   virtual std::span<const Filter> filters() const = 0;
   virtual std::vector<ParameterInfo> parameters() const = 0;
+  /// Throws UsageError for values that no mesh would make acceptable. `parameters` is complete.
+  virtual void check_parameters(const Json& parameters) const = 0;
   virtual Support supported(const ContextInfo& context) const = 0;
   /// Builds the field. Throws UsageError for a bad parameter, UnsupportedError for
   /// a filter or a size that this encoding cannot take (naming what it can), and
@@ -128,7 +131,7 @@ std::span<const Encoding* const> all_encodings();
 /// Throws a UsageError that names the known ones.
 const Encoding& find_encoding(std::string_view name);
 
-/// Checks keys against `parameters()` and fills in defaults. Throws UsageError.
+/// Checks keys and values and fills in defaults. Throws UsageError.
 Json complete_parameters(const Encoding& encoding, const Json& given);
 /// Throws UnsupportedError naming the filters that the encoding has.
 void require_filter(const Encoding& encoding, Filter filter);

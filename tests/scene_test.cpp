@@ -1,4 +1,6 @@
 // Views, transfer functions, their JSON, and float pictures.
+#include "renderers/scene.hpp"
+
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -9,7 +11,6 @@
 #include <limits>
 
 #include "renderers/picture.hpp"
-#include "renderers/scene.hpp"
 
 namespace amrtex {
 namespace {
@@ -94,7 +95,8 @@ TransferFunction example() {
 
 TEST(TransferFunctions, PiecewiseLinear) {
   const TransferFunction tf = example();
-  for (const auto& [value, extinction] : {std::pair{0.0, 0.0}, {1, 0}, {5.5, 2}, {10, 4}, {55, 3}, {100, 2}, {1e9, 2}, {-kInf, 0}, {kInf, 2}})
+  for (const auto& [value, extinction] :
+       {std::pair{0.0, 0.0}, {1, 0}, {5.5, 2}, {10, 4}, {55, 3}, {100, 2}, {1e9, 2}, {-kInf, 0}, {kInf, 2}})
     EXPECT_DOUBLE_EQ(tf.extinction_at(value), extinction) << value;
   expect_near(tf.color_at(50.5), {0.5, 0, 0.5});
   expect_near(tf.color_at(-3), {1, 0, 0});
@@ -176,8 +178,8 @@ TEST(SceneJson, ViewsErrorsNameTheKey) {
 }
 
 TEST(SceneJson, TransferFunctionsRoundTrip) {
-  const Json json = Json::parse(
-      R"({"extinction":[[1.0,0.0],[2.0,5.5]],"color":[[1.0,1.0,0.5,0.0]],"scale":"log","length_unit":"world"})");
+  const Json json =
+      Json::parse(R"({"extinction":[[1.0,0.0],[2.0,5.5]],"color":[[1.0,1.0,0.5,0.0]],"scale":"log","length_unit":"world"})");
   const TransferFunction tf = parse_transfer_function(json);
   EXPECT_TRUE(tf.logarithmic);
   EXPECT_EQ(tf.length_unit, TransferFunction::LengthUnit::world);
@@ -190,7 +192,8 @@ TEST(SceneJson, TransferFunctionErrorsNameTheKey) {
   const auto refused = [](const char* text, std::initializer_list<const char*> words) {
     expect_mentions(message_of<Error>([&] { parse_transfer_function(Json::parse(text)); }), words);
   };
-  refused(R"({"extinction":[[1,0]],"color":[[1,1,1,1]],"opacity":[]})", {"opacity", "extinction", "color", "scale", "length_unit"});
+  refused(R"({"extinction":[[1,0]],"color":[[1,1,1,1]],"opacity":[]})",
+          {"opacity", "extinction", "color", "scale", "length_unit"});
   refused(R"({"extinction":[[1,0]]})", {"color"});
   refused(R"({"extinction":[[1,0,3]],"color":[[1,1,1,1]]})", {"extinction", "[value, extinction]"});
   refused(R"({"extinction":[[1,0]],"color":[[1,1,1]]})", {"color", "[value, r, g, b]"});
@@ -210,7 +213,9 @@ TEST(SceneJson, ModesAndSamplings) {
 
 class PictureFile : public ::testing::Test {
  protected:
-  PictureFile() : folder_(fs::temp_directory_path() / fmt::format("amrtex_picture_{}", ::getpid())) { fs::create_directories(folder_); }
+  PictureFile() : folder_(fs::temp_directory_path() / fmt::format("amrtex_picture_{}", ::getpid())) {
+    fs::create_directories(folder_);
+  }
   ~PictureFile() override { fs::remove_all(folder_); }
   fs::path folder_;
 };

@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <set>
 
 #include "page_table_layout.h"
@@ -23,7 +24,8 @@ constexpr std::array<Filter, 3> kFilters{Filter::nearest, Filter::linear_page, F
 constexpr std::int64_t kMaxTableBytes = std::int64_t{256} << 20;
 /// Texture axes beyond this cost bits of the normalised coordinate (hardware filtering).
 constexpr int kPreferredPoolEdge = 1024;
-constexpr int kEntryBytes = 8;
+constexpr std::int64_t kMostPages = std::int64_t{1} << AMRTEX_PAGE_INDEX_BITS;
+constexpr int kMostLevels = 1 << AMRTEX_PAGE_LEVEL_BITS;
 
 struct Options {
   int page_size;
@@ -37,20 +39,16 @@ struct Options {
 /// A final page of the partition: where it lies, and what became of it.
 struct Page {
   int level;
-  Vec3i index;  ///< in pages of its level
+  Vec3i index_in_level;  ///< in pages of its level
   int kind = AMRTEX_PAGE_ABSENT;
-  std::uint32_t code = 0;  ///< index in the pool, or the constant's bits
+  std::uint32_t index = 0;  ///< in the pool
+  std::uint32_t green = 0;  ///< second channel of its entries
   ValueRange range;
 };
 
-struct Entry {
-  std::uint32_t red;
-  std::uint32_t green;
-};
-static_assert(sizeof(Entry) == kEntryBytes);
-
-Entry entry_of(const Page& page) {
-  return {page.code, static_cast<std::uint32_t>(page.level) | (static_cast<std::uint32_t>(page.kind) << AMRTEX_PAGE_KIND_SHIFT)};
+std::uint32_t red_of(int kind, int level, std::uint32_t index) {
+  return index | (static_cast<std::uint32_t>(level) << AMRTEX_PAGE_INDEX_BITS) |
+         (static_cast<std::uint32_t>(kind) << (AMRTEX_PAGE_INDEX_BITS + AMRTEX_PAGE_LEVEL_BITS));
 }
 
 /// Blocks of `edge` texels in a 3D texture of 2^shift.x by 2^shift.y by `layers` blocks:
@@ -66,17 +64,18 @@ struct PoolLayout {
   }
 };
 
-/// False when the blocks do not fit into one texture of at most `limit` texels an axis.
+/// False when the blocks do not fit into one texture of at most `limit` texels an axis. As few
+/// blocks side by side along x as possible, so that a block's rows lie close in memory; then
+/// as few along y, which leaves least unused.
 bool lay_out(std::int64_t blocks, int edge, int limit, PoolLayout& layout) {
-  for (int most : {std::min(limit, kPreferredPoolEdge), limit})
-    for (int bits = 0; bits < 40; ++bits) {
-      const PoolLayout l{{(bits + 1) / 2, bits / 2, 0}, static_cast<int>(std::min<std::int64_t>((blocks + (std::int64_t{1} << bits) - 1) >> bits, 1 << 30)), edge};
-      if (static_cast<std::int64_t>(edge) << l.shift.x > most) break;
-      if (std::int64_t{edge} * l.layers > most) continue;
-      layout = l;
-      layout.layers = std::max(layout.layers, 1);
-      return true;
-    }
+  for (std::int64_t most : {std::min(limit, kPreferredPoolEdge), limit})
+    for (int x = 0; (std::int64_t{edge} << x) <= most; ++x)
+      for (int y = 0; (std::int64_t{edge} << y) <= most; ++y) {
+        const std::int64_t layers = std::max<std::int64_t>((blocks + (std::int64_t{1} << (x + y)) - 1) >> (x + y), 1);
+        if (edge * layers > most) continue;
+        layout = {{x, y, 0}, static_cast<int>(layers), edge};
+        return true;
+      }
   return false;
 }
 
@@ -88,7 +87,7 @@ std::vector<Page> partition(const AmrHierarchy& h, int page_size) {
     const Box inside = intersection(box, h.domain(level));
     if (inside.empty()) return;
     if (!h.refined_within(level, inside)) {
-      pages.push_back({.level = level, .index = index, .range = {}});
+      pages.push_back({.level = level, .index_in_level = index, .range = {}});
       return;
     }
     const int r = h.ratio_to_finer(level);
@@ -106,18 +105,21 @@ struct TablePlan {
   int sub_edge = 1;         ///< entries along the edge of a sub-table; 1: one level
   std::int64_t subtables = 0;
   PoolLayout sub_layout;
+  bool green = true;        ///< entries have their second channel
+  std::int64_t entry_bytes() const { return green ? 8 : 4; }
   bool two_levels() const { return sub_edge > 1; }
-  std::int64_t top_bytes() const { return std::int64_t{top.x} * top.y * top.z * kEntryBytes; }
+  std::int64_t top_bytes() const { return std::int64_t{top.x} * top.y * top.z * entry_bytes(); }
   std::int64_t sub_bytes() const {
     const Vec3i t = sub_layout.texels();
-    return two_levels() ? std::int64_t{t.x} * t.y * t.z * kEntryBytes : 0;
+    return two_levels() ? std::int64_t{t.x} * t.y * t.z * entry_bytes() : 0;
   }
 };
 
 std::int64_t entries(const Vec3d& n) { return static_cast<std::int64_t>(std::min(n.x * n.y * n.z, 1e18)); }
 
-TablePlan plan_table(const AmrHierarchy& h, const std::vector<Page>& pages, int page_size, const BuildRequest& request) {
+TablePlan plan_table(const AmrHierarchy& h, const std::vector<Page>& pages, int page_size, const BuildRequest& request, bool constants) {
   TablePlan plan;
+  plan.green = request.needs.value_ranges || constants;
   for (const Page& p : pages) plan.finest_level = std::max(plan.finest_level, p.level);
   const Vec3i roots = ceil_div(h.cells(0), page_size);
   const int limit = request.context.max_3d_texture_size;
@@ -126,7 +128,7 @@ TablePlan plan_table(const AmrHierarchy& h, const std::vector<Page>& pages, int 
 
   const Vec3d one = top_of(plan.finest_level);
   plan.top_level = plan.finest_level;
-  if (fits(one) && entries(one) * kEntryBytes <= std::min(kMaxTableBytes, request.memory_limit)) {
+  if (fits(one) && entries(one) * plan.entry_bytes() <= std::min(kMaxTableBytes, request.memory_limit)) {
     plan.top = Vec3i(one);
     return plan;
   }
@@ -138,13 +140,13 @@ TablePlan plan_table(const AmrHierarchy& h, const std::vector<Page>& pages, int 
     std::set<std::array<int, 3>> divided;
     for (const Page& p : pages)
       if (p.level > level) {
-        const Vec3i i = p.index / (h.cell_width(level) / h.cell_width(p.level));
+        const Vec3i i = p.index_in_level / (h.cell_width(level) / h.cell_width(p.level));
         divided.insert({i.x, i.y, i.z});
       }
     PoolLayout layout;
     const auto count = static_cast<std::int64_t>(divided.size());
     if (edge > limit || !lay_out(count, edge, limit, layout)) continue;
-    const std::int64_t bytes = entries(top) * kEntryBytes + count * kEntryBytes * edge * edge * edge;
+    const std::int64_t bytes = entries(top) * plan.entry_bytes() + count * plan.entry_bytes() * edge * edge * edge;
     if (bytes >= best) continue;
     best = bytes;
     plan.top_level = level;
@@ -168,7 +170,7 @@ class PageReader {
 
   /// Fills values() and the page's kind, range and constant.
   void read(Page& page) {
-    const Vec3i first = page.index * options_.page_size;
+    const Vec3i first = page.index_in_level * options_.page_size;
     const Box cells{first, first + Vec3i(options_.page_size)};
     box_ = options_.nodes ? Box{first, first + Vec3i(options_.edge)} : cells.grown(options_.border);
     if (options_.nodes) {
@@ -183,7 +185,7 @@ class PageReader {
 
   /// Sets the bit of each cell of the page that has a value.
   void write_validity(const Page& page, std::uint32_t* words) const {
-    const Vec3i first = page.index * options_.page_size;
+    const Vec3i first = page.index_in_level * options_.page_size;
     std::int64_t bit = 0;
     const Box domain = hierarchy_.domain(page.level);
     for_each_cell({first, first + Vec3i(options_.page_size)}, [&](const Vec3i& c) {
@@ -219,7 +221,7 @@ class PageReader {
     if (!any) page.kind = AMRTEX_PAGE_ABSENT;
     else if (all && page.range.min == page.range.max && constant_is_exact(page.range.min)) {
       page.kind = AMRTEX_PAGE_CONSTANT;
-      page.code = std::bit_cast<std::uint32_t>(static_cast<float>(page.range.min));
+      page.green = std::bit_cast<std::uint32_t>(static_cast<float>(page.range.min));
     }
   }
 
@@ -251,15 +253,17 @@ class PageTable final : public Encoding {
     return {{"page_size", "cells along the edge of a page", 16, "4, 8, 16, 32, 64 or 128"},
             {"centring", "what a texel of a page is: a cell, or a vertex (then the filter is linear_vertex)", "cell", "\"cell\" or \"node\""}};
   }
+  void check_parameters(const Json& parameters) const override { values(parameters); }
   Support supported(const ContextInfo&) const override { return {}; }
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
+  Options values(const Json& parameters) const;
   Options options(const Json& parameters, Filter filter) const;
   Sizes sizes(std::int64_t stored, const Options& o, const TablePlan& table, bool validity, const BuildRequest& request) const;
 };
 
-Options PageTable::options(const Json& parameters, Filter filter) const {
+Options PageTable::values(const Json& parameters) const {
   Options o{};
   o.page_size = integer_parameter(*this, parameters, "page_size");
   if (o.page_size < 4 || o.page_size > 128 || !std::has_single_bit(static_cast<unsigned>(o.page_size)))
@@ -268,9 +272,14 @@ Options PageTable::options(const Json& parameters, Filter filter) const {
   if (centring != "cell" && centring != "node")
     throw UsageError(fmt::format("encoding page_table: parameter centring is {}; accepted: \"cell\" or \"node\"", centring.dump()));
   o.nodes = centring == "node";
+  return o;
+}
+
+Options PageTable::options(const Json& parameters, Filter filter) const {
+  Options o = values(parameters);
   if (o.nodes != (filter == Filter::linear_vertex))
     throw UnsupportedError(fmt::format("encoding page_table: centring {} has no filter {}; centring cell has nearest, linear_page and centring node has linear_vertex",
-                                       centring.get<std::string>(), filter_name(filter)));
+                                       o.nodes ? "node" : "cell", filter_name(filter)));
   o.border = filter == Filter::linear_page ? 1 : 0;
   o.edge = o.nodes ? o.page_size + 1 : o.page_size + 2 * o.border;
   return o;
@@ -285,12 +294,13 @@ Sizes PageTable::sizes(std::int64_t stored, const Options& o, const TablePlan& t
     throw UnsupportedError(fmt::format("encoding page_table with page_size {}: {} pages of {}^3 texels do not fit a 3D texture of {} texels an axis",
                                        o.page_size, stored, o.edge, limit));
   const std::int64_t validity_bytes = validity ? stored * o.page_cells() / 8 : 0;
-  const std::int64_t range_bytes = request.needs.value_ranges ? 8 * stored : 0;
-  for (std::int64_t buffer : {validity_bytes, range_bytes})
-    if (buffer > request.context.max_buffer_bytes)
-      throw UnsupportedError(fmt::format("encoding page_table with page_size {}: a buffer of {} bytes, this context has at most {}", o.page_size,
-                                         buffer, request.context.max_buffer_bytes));
-  require_budget(*this, s.pool_texels() * texel_bytes(request.storage) + table.top_bytes() + table.sub_bytes() + validity_bytes + range_bytes, request);
+  if (validity_bytes > request.context.max_buffer_bytes)
+    throw UnsupportedError(fmt::format("encoding page_table with page_size {}: validity bits take {} bytes, a buffer of this context at most {}",
+                                       o.page_size, validity_bytes, request.context.max_buffer_bytes));
+  if (stored > kMostPages)
+    throw UnsupportedError(fmt::format("encoding page_table with page_size {}: {} pages, an entry of the table numbers at most {}", o.page_size, stored,
+                                       kMostPages));
+  require_budget(*this, s.pool_texels() * texel_bytes(request.storage) + table.top_bytes() + table.sub_bytes() + validity_bytes, request);
   return s;
 }
 
@@ -313,40 +323,52 @@ std::int64_t number_pages(const AmrHierarchy& h, const BuildRequest& request, co
   });
   std::int64_t stored = 0;
   for (Page& p : pages)
-    if (p.kind == AMRTEX_PAGE_STORED) p.code = static_cast<std::uint32_t>(stored++);
+    if (p.kind == AMRTEX_PAGE_STORED) p.index = static_cast<std::uint32_t>(stored++);
   return stored;
 }
 
-/// Writes the entries of one page into a table (first level or sub-table) whose entries are
-/// pages of `table_level`; `origin` is the table's first entry, in pages of that level.
+struct Entry {
+  std::uint32_t red = 0;
+  std::uint32_t green = 0;
+};
+
+void write_entry(HostTexture& texture, const Vec3i& texel, const Entry& entry) {
+  const std::size_t i = Box{Vec3i(0), texture.size}.offset(texel);
+  if (texture.format == TexelFormat::r32ui) texture.as<std::uint32_t>()[i] = entry.red;
+  else texture.as<Entry>()[i] = entry;
+}
+
+/// Writes the entries of one page into `table`, the box of entries (pages of `table_level`)
+/// that stand in the texture from texel `at`.
 void write_entries(const AmrHierarchy& h, const Page& page, int table_level, const Box& table, HostTexture& texture, const Vec3i& at) {
   const int r = h.cell_width(page.level) / h.cell_width(table_level);
-  const Box all{Vec3i(0), texture.size};
-  for_each_cell(intersection(Box{page.index, page.index + Vec3i(1)}.refined(r), table),
-                [&](const Vec3i& i) { texture.as<Entry>()[all.offset(i - table.lower + at)] = entry_of(page); });
+  const Entry entry{red_of(page.kind, page.level, page.index), page.green};
+  for_each_cell(intersection(Box{page.index_in_level, page.index_in_level + Vec3i(1)}.refined(r), table),
+                [&](const Vec3i& i) { write_entry(texture, i - table.lower + at, entry); });
 }
 
 std::vector<HostTexture> make_table(const AmrHierarchy& h, const TablePlan& plan, const std::vector<Page>& pages) {
+  const TexelFormat format = plan.green ? TexelFormat::rg32ui : TexelFormat::r32ui;
   std::vector<HostTexture> textures;
-  textures.push_back(make_texture("tex_page_table", TexelFormat::rg32ui, plan.top));
-  if (plan.two_levels()) textures.push_back(make_texture("tex_page_subtables", TexelFormat::rg32ui, plan.sub_layout.texels()));
+  textures.push_back(make_texture("tex_page_table", format, plan.top));
+  if (plan.two_levels()) textures.push_back(make_texture("tex_page_subtables", format, plan.sub_layout.texels()));
   HostTexture& top = textures[0];
   const Box top_box{Vec3i(0), plan.top};
-  std::uint32_t next = 0;
+  std::map<std::size_t, std::uint32_t> subtables;  // by the entry that points to it
   for (const Page& page : pages) {
     if (page.level <= plan.top_level) {
       write_entries(h, page, plan.top_level, top_box, top, Vec3i(0));
       continue;
     }
-    const Vec3i owner = page.index / (h.cell_width(plan.top_level) / h.cell_width(page.level));
-    Entry& entry = top.as<Entry>()[top_box.offset(owner)];
-    if ((entry.green >> AMRTEX_PAGE_KIND_SHIFT) != AMRTEX_PAGE_SUBTABLE) entry = {next++, AMRTEX_PAGE_SUBTABLE << AMRTEX_PAGE_KIND_SHIFT};
-    const Box sub = Box{owner, owner + Vec3i(1)}.refined(plan.sub_edge);
-    write_entries(h, page, plan.finest_level, sub, textures[1], plan.sub_layout.position(entry.red));
+    const Vec3i owner = page.index_in_level / (h.cell_width(plan.top_level) / h.cell_width(page.level));
+    const auto [sub, added] = subtables.try_emplace(top_box.offset(owner), static_cast<std::uint32_t>(subtables.size()));
+    if (added) write_entry(top, owner, {red_of(AMRTEX_PAGE_SUBTABLE, 0, sub->second), 0});
+    const Box entries = Box{owner, owner + Vec3i(1)}.refined(plan.sub_edge);
+    write_entries(h, page, plan.finest_level, entries, textures[1], plan.sub_layout.position(sub->second));
   }
   for (HostTexture& t : textures) t.roles.topology = t.bytes();
   if (plan.two_levels()) {
-    const std::int64_t used = plan.subtables * kEntryBytes * plan.sub_edge * plan.sub_edge * plan.sub_edge;
+    const std::int64_t used = plan.subtables * plan.entry_bytes() * plan.sub_edge * plan.sub_edge * plan.sub_edge;
     textures[1].roles = {0, 0, used, textures[1].bytes() - used};
   }
   return textures;
@@ -358,7 +380,7 @@ MemoryByRole pool_roles(const AmrHierarchy& h, const Options& o, const std::vect
   const int bytes = texel_bytes(pool.format);
   for (const Page& p : pages) {
     if (p.kind != AMRTEX_PAGE_STORED) continue;
-    const Vec3i first = p.index * o.page_size;
+    const Vec3i first = p.index_in_level * o.page_size;
     const std::int64_t own = intersection(Box{first, first + Vec3i(o.page_size)}, h.domain(p.level)).cells();
     roles.payload += own * bytes;
     roles.duplicated += (o.page_texels() - o.page_cells()) * bytes;
@@ -378,7 +400,7 @@ Json statistics(const AmrHierarchy& h, const Options& o, const std::vector<Page>
     absent += p.kind == AMRTEX_PAGE_ABSENT ? 1 : 0;
     if (p.kind == AMRTEX_PAGE_STORED) {
       ++levels[static_cast<std::size_t>(p.level)];
-      const Vec3i first = p.index * o.page_size;
+      const Vec3i first = p.index_in_level * o.page_size;
       cells += intersection(Box{first, first + Vec3i(o.page_size)}, h.domain(p.level)).cells();
     }
   }
@@ -392,68 +414,102 @@ Json statistics(const AmrHierarchy& h, const Options& o, const std::vector<Page>
   json["border_overhead"] = static_cast<double>(stored * (o.page_texels() - o.page_cells())) / pages_cells;
   json["oversampling"] = static_cast<double>(cells) / static_cast<double>(h.leaf_cells());
   json["table_levels"] = table.two_levels() ? 2 : 1;
-  json["table_entries"] = table.top_bytes() / kEntryBytes;
+  json["table_entries"] = table.top_bytes() / table.entry_bytes();
   json["subtables"] = table.subtables;
   return json;
+}
+
+/// Node-centred pages lie side by side without a border: in a page's last vertex the rounding of the
+/// normalised coordinate (3 times 2^-24 of the pool an axis) lets the texture unit see a little of the next page.
+double leaked_value(const FieldStatistics& s, const Vec3i& pool) {
+  const double weight = 3 * std::ldexp(3.0, -24) * std::max({pool.x, pool.y, pool.z});
+  return weight * std::max({s.max - s.min, std::abs(s.min), std::abs(s.max)});
+}
+
+/// What the pages are written to.
+struct Storages {
+  HostTexture pool;
+  HostTexture validity;  ///< without data where every cell has a value
+};
+
+/// Reads the stored pages once more and writes their values, validity bits and coded ranges.
+Storages store_pages(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Sizes& size, const EncodedField& field,
+                     std::vector<Page>& pages) {
+  Storages out;
+  out.pool = make_texture("tex_pages", request.storage, size.pool.texels());
+  out.pool.hardware_linear = field.filtering == Filtering::hardware;
+  out.pool.holds_values = true;
+  const bool validity = h.has_missing(request.field);
+  const std::int64_t words = o.page_cells() / 32;  // a page
+  if (validity) out.validity = make_buffer("page_validity", TexelFormat::r32ui, size.stored * words);
+  const double leak = out.pool.hardware_linear && o.nodes ? leaked_value(h.statistics(request.field), out.pool.size) : 0;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pages.size(), 8), [&](const auto& range) {
+    PageReader reader(h, request, o);
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      Page& page = pages[i];
+      if (page.kind != AMRTEX_PAGE_STORED) continue;
+      reader.read(page);
+      write_page(o, size.pool, page.index, request.storage, field.scale, reader.values(), out.pool);
+      if (validity) reader.write_validity(page, out.validity.as<std::uint32_t>() + page.index * words);
+      if (request.needs.value_ranges)
+        page.green = encode_range({page.range.min - leak, page.range.max + leak}, field.range_origin, request.storage, field.scale);
+    }
+  });
+  out.pool.roles = pool_roles(h, o, pages, out.pool);
+  return out;
+}
+
+void add_shader_inputs(const AmrHierarchy& h, const Options& o, const TablePlan& table, const Sizes& size, bool constants, EncodedField& field) {
+  auto& defines = field.shader.defines;
+  defines.emplace_back("AMRTEX_PAGE_SIZE", o.page_size);
+  defines.emplace_back("AMRTEX_PAGE_BORDER", o.border);
+  defines.emplace_back("AMRTEX_PAGE_EDGE", o.edge);
+  defines.emplace_back("AMRTEX_PAGE_NODES", o.nodes ? 1 : 0);
+  defines.emplace_back("AMRTEX_PAGE_CONSTANTS", constants ? 1 : 0);
+  defines.emplace_back("AMRTEX_PAGE_TABLE_LEVELS", table.two_levels() ? 2 : 1);
+  auto& uniforms = field.integer_uniforms;
+  uniforms.emplace_back("u_page_table", Vec3i(o.page_size * h.cell_width(table.top_level), 0, 0));
+  uniforms.emplace_back("u_pool_shift", size.pool.shift);
+  uniforms.emplace_back("u_pool_texels", size.pool.texels());
+  if (!table.two_levels()) return;
+  uniforms.emplace_back("u_subtable", Vec3i(table.sub_edge, o.page_size * h.cell_width(table.finest_level), 0));
+  uniforms.emplace_back("u_subtable_shift", table.sub_layout.shift);
+}
+
+std::vector<LeftOut> left_out(const Options& o, const TablePlan& table, std::int64_t stored, bool validity, Storage storage) {
+  std::vector<LeftOut> list;
+  if (!validity) list.push_back({"validity bits", "every cell has a value", stored * o.page_cells() / 8});
+  if (!table.green)
+    list.push_back({"second channel of the table", "no region is skipped and no page is constant", table.top_bytes() + table.sub_bytes()});
+  if (!o.nodes && o.border == 0) {
+    const std::int64_t with_border = std::int64_t{o.page_size + 2} * (o.page_size + 2) * (o.page_size + 2);
+    list.push_back({"border layer", "the filter nearest reads one cell", stored * (with_border - o.page_cells()) * texel_bytes(storage)});
+  }
+  return list;
 }
 
 EncodedField PageTable::build(const AmrHierarchy& h, const BuildRequest& request) const {
   require_filter(*this, request.needs.filter);
   const Json parameters = complete_parameters(*this, request.parameters);
   const Options o = options(parameters, request.needs.filter);
-  const bool validity = h.has_missing(request.field);
+  if (h.level_count() > kMostLevels)
+    throw UnsupportedError(fmt::format("encoding page_table: {} levels, an entry of the table tells at most {}", h.level_count(), kMostLevels));
   std::vector<Page> pages = partition(h, o.page_size);
-  const TablePlan table = plan_table(h, pages, o.page_size, request);
   const std::int64_t stored = number_pages(h, request, o, pages);
+  const bool constants = std::any_of(pages.begin(), pages.end(), [](const Page& p) { return p.kind == AMRTEX_PAGE_CONSTANT; });
+  const TablePlan table = plan_table(h, pages, o.page_size, request, constants);
+  const bool validity = h.has_missing(request.field);
   const Sizes size = sizes(stored, o, table, validity, request);
 
   EncodedField field = start_field(*this, h, request, parameters);
   if (request.needs.filter == Filter::linear_page) field.definition.page_size = o.page_size;
-  HostTexture pool = make_texture("tex_pages", request.storage, size.pool.texels());
-  pool.hardware_linear = field.filtering == Filtering::hardware;
-  pool.holds_values = true;
-  HostTexture bits = validity ? make_buffer("page_validity", TexelFormat::r32ui, stored * o.page_cells() / 32) : HostTexture{};
-  HostTexture ranges = request.needs.value_ranges ? make_buffer("page_ranges", TexelFormat::rg32f, stored) : HostTexture{};
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pages.size(), 8), [&](const auto& range) {
-    PageReader reader(h, request, o);
-    for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      if (pages[i].kind != AMRTEX_PAGE_STORED) continue;
-      Page page = pages[i];
-      reader.read(page);
-      const std::int64_t index = pages[i].code;
-      write_page(o, size.pool, index, request.storage, field.scale, reader.values(), pool);
-      if (validity) reader.write_validity(page, bits.as<std::uint32_t>() + index * o.page_cells() / 32);
-      if (request.needs.value_ranges) store_range(page.range, request.storage, field.scale, ranges.as<float>() + 2 * index);
-    }
-  });
-  pool.roles = pool_roles(h, o, pages, pool);
-
+  Storages stores = store_pages(h, request, o, size, field, pages);
   field.statistics = statistics(h, o, pages, table, stored);
-  const bool constants = field.statistics["constant_pages"] != 0;
-  for (const auto& [name, value] : std::initializer_list<std::pair<const char*, int>>{{"AMRTEX_PAGE_SIZE", o.page_size},
-                                                                                       {"AMRTEX_PAGE_BORDER", o.border},
-                                                                                       {"AMRTEX_PAGE_EDGE", o.edge},
-                                                                                       {"AMRTEX_PAGE_NODES", o.nodes ? 1 : 0},
-                                                                                       {"AMRTEX_PAGE_CONSTANTS", constants ? 1 : 0},
-                                                                                       {"AMRTEX_PAGE_TABLE_LEVELS", table.two_levels() ? 2 : 1}})
-    field.shader.defines.emplace_back(name, value);
-  field.integer_uniforms = {{"u_page_table", Vec3i(o.page_size * h.cell_width(table.top_level), 0, 0)},
-                            {"u_pool_shift", size.pool.shift},
-                            {"u_pool_texels", pool.size}};
-  if (table.two_levels()) {
-    field.integer_uniforms.emplace_back("u_subtable", Vec3i(table.sub_edge, o.page_size * h.cell_width(table.finest_level), 0));
-    field.integer_uniforms.emplace_back("u_subtable_shift", table.sub_layout.shift);
-  }
+  add_shader_inputs(h, o, table, size, constants, field);
+  field.left_out = left_out(o, table, stored, validity, request.storage);
   field.textures = make_table(h, table, pages);
-  field.textures.push_back(std::move(pool));
-  if (validity) field.textures.push_back(std::move(bits));
-  else field.left_out.push_back({"validity bits", "every cell has a value", stored * o.page_cells() / 8});
-  if (request.needs.value_ranges) field.textures.push_back(std::move(ranges));
-  else field.left_out.push_back({"value ranges", "no region is skipped", 8 * stored});
-  if (!o.nodes && o.border == 0) {
-    const std::int64_t with_border = std::int64_t{o.page_size + 2} * (o.page_size + 2) * (o.page_size + 2);
-    field.left_out.push_back({"border layer", "the filter nearest reads one cell", stored * (with_border - o.page_cells()) * texel_bytes(request.storage)});
-  }
+  field.textures.push_back(std::move(stores.pool));
+  if (validity) field.textures.push_back(std::move(stores.validity));
   field.host_peak_bytes = field.memory().total() + static_cast<std::int64_t>(pages.size() * sizeof(Page));
   return field;
 }

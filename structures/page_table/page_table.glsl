@@ -40,42 +40,46 @@ UNIFORM(ivec3, u_pool_texels)    // size of the pool
 #if AMRTEX_CPP || AMRTEX_VALIDITY
 BUFFER(uint, page_validity, page_validity_block)  // one bit a cell, each page from a new word
 #endif
-#if AMRTEX_CPP || AMRTEX_VALUE_RANGES
-BUFFER(vec2r, page_ranges, page_ranges_block)  // minimum and maximum a page, border included
-#endif
 
 // Position of block `index` in a texture that holds 2^shift.x by 2^shift.y by n blocks.
 ivec3 page_pool_position(IN(int) index, IN(ivec3) shift) {
   return ivec3(index & ((1 << shift.x) - 1), (index >> shift.x) & ((1 << shift.y) - 1), index >> (shift.x + shift.y));
 }
 
+int page_entry_kind(IN(uint) red) { return int(red >> uint(AMRTEX_PAGE_INDEX_BITS + AMRTEX_PAGE_LEVEL_BITS)); }
+int page_entry_level(IN(uint) red) { return int((red >> uint(AMRTEX_PAGE_INDEX_BITS)) & uint((1 << AMRTEX_PAGE_LEVEL_BITS) - 1)); }
+int page_entry_index(IN(uint) red) { return int(red & uint((1 << AMRTEX_PAGE_INDEX_BITS) - 1)); }
+
 bool locate(IN(Position) p, OUT(Region) r) {
   ivec3 t = divide_by_width(p.cell, u_page_table.x);
   uvec4 entry = texelFetch(tex_page_table, t, 0);
-  int kind = int(entry.y >> uint(AMRTEX_PAGE_KIND_SHIFT));
+  int kind = page_entry_kind(entry.x);
 #if AMRTEX_CPP || AMRTEX_PAGE_TABLE_LEVELS == 2
   if (AMRTEX_PAGE_TABLE_LEVELS == 2 && kind == AMRTEX_PAGE_SUBTABLE) {
     ivec3 s = divide_by_width(p.cell - t * u_page_table.x, u_subtable.y);
-    entry = texelFetch(tex_page_subtables, page_pool_position(int(entry.x), u_subtable_shift) * u_subtable.x + s, 0);
-    kind = int(entry.y >> uint(AMRTEX_PAGE_KIND_SHIFT));
+    entry = texelFetch(tex_page_subtables, page_pool_position(page_entry_index(entry.x), u_subtable_shift) * u_subtable.x + s, 0);
+    kind = page_entry_kind(entry.x);
   }
 #endif
-  r.level = int(entry.y & uint(AMRTEX_PAGE_LEVEL_MASK));
-  r.width = u_level_width[r.level];
+  r.level = page_entry_level(entry.x);
+  r.width = level_width(r.level);
   int page_width = AMRTEX_PAGE_SIZE * r.width;
   r.lower = divide_by_width(p.cell, page_width) * page_width;
   r.upper = min(r.lower + ivec3(page_width), u_domain_cells);
   r.value_range = vec2r(0);
-  int index = int(entry.x);
+  int index = page_entry_index(entry.x);
   ivec3 texel = page_pool_position(index, u_pool_shift) * AMRTEX_PAGE_EDGE;
   r.handle = ivec4(texel.x, texel.y, texel.z, index);
-  if (AMRTEX_PAGE_CONSTANTS != 0 && kind == AMRTEX_PAGE_CONSTANT) {
-    r.handle = ivec4(0, 0, index, -1);
-    r.value_range = vec2r(as_real(entry.x));
-  }
-#if AMRTEX_CPP || AMRTEX_VALUE_RANGES
-  if (AMRTEX_VALUE_RANGES != 0 && kind == AMRTEX_PAGE_STORED) r.value_range = page_ranges[index];
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+  // a cell's centre is its texel's; a vertex sits on the corner, half a texel from its own
+  r.texture_scale = vec3r(1) / vec3r(u_pool_texels);
+  r.texture_lower = (vec3r(texel) + (AMRTEX_PAGE_NODES != 0 ? vec3r(0.5) : vec3r(AMRTEX_PAGE_BORDER))) * r.texture_scale;
 #endif
+  if (AMRTEX_VALUE_RANGES != 0) r.value_range = decode_range(entry.y);
+  if (AMRTEX_PAGE_CONSTANTS != 0 && kind == AMRTEX_PAGE_CONSTANT) {
+    r.handle = ivec4(0, 0, int(entry.y), -1);
+    r.value_range = vec2r(as_real(entry.y));
+  }
   return kind != AMRTEX_PAGE_ABSENT;
 }
 
@@ -96,9 +100,7 @@ real page_stored_value(IN(Region) r, IN(vec3r) q) {
   if (AMRTEX_FILTER == AMRTEX_FILTER_NEAREST)
     return decode_value(page_texel(page + clamp(ivec3(floor(q)), ivec3(0), ivec3(AMRTEX_PAGE_SIZE - 1)) + AMRTEX_PAGE_BORDER));
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
-  // a cell's centre is its texel's; a vertex sits on the corner, half a texel from its own
-  vec3r texel = vec3r(page) + (AMRTEX_PAGE_NODES != 0 ? vec3r(0.5) : vec3r(AMRTEX_PAGE_BORDER)) + q;
-  return decode_value(textureLod(tex_pages, texel / vec3r(u_pool_texels), 0.0).x);
+  return decode_value(textureLod(tex_pages, r.texture_lower + q * r.texture_scale, 0.0).x);
 #else
   PRECISE vec3r from_first = AMRTEX_PAGE_NODES != 0 ? q : q + vec3r(real(AMRTEX_PAGE_BORDER) - real(0.5));
   vec3r whole = clamp(floor(from_first), vec3r(0), vec3r(AMRTEX_PAGE_EDGE - 2));

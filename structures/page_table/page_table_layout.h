@@ -1,14 +1,15 @@
 // Shared by page_table.cpp and page_table.glsl.
 //
-// An entry of the page table (two 32-bit channels):
+// An entry of the page table (32-bit channels; the second one only where ranges or
+// constants exist):
 //
-//   red    page: its index in the pool | constant: the value as float bits | sub-table: its index
-//   green  31            16 15      8 7       0
-//          [    unused     | kind    | level   ]
+//   red    31  30 29     24 23                0
+//          [kind ][ level  ][ index            ]   of the page in the pool, or of the sub-table
+//   green  page: its coded value range | constant: the value as float bits
 #define AMRTEX_PAGE_ABSENT 0    // no mesh here: neither page nor value
 #define AMRTEX_PAGE_STORED 1
 #define AMRTEX_PAGE_CONSTANT 2  // all cells and their border have one value
 #define AMRTEX_PAGE_SUBTABLE 3  // look on in the second level of the table
 
-#define AMRTEX_PAGE_LEVEL_MASK 255
-#define AMRTEX_PAGE_KIND_SHIFT 8
+#define AMRTEX_PAGE_INDEX_BITS 24
+#define AMRTEX_PAGE_LEVEL_BITS 6

@@ -25,7 +25,7 @@ struct Plan {
   std::int64_t cell_count() const { return std::int64_t{cells.x} * cells.y * cells.z; }
   std::int64_t block_count() const { return std::int64_t{blocks.x} * blocks.y * blocks.z; }
   std::int64_t bytes(Storage storage) const {
-    return cell_count() * texel_bytes(storage) + (validity ? 4 * words_for_bits(cell_count()) : 0) + (ranges ? 8 * block_count() : 0);
+    return cell_count() * texel_bytes(storage) + (validity ? 4 * words_for_bits(cell_count()) : 0) + (ranges ? 4 * block_count() : 0);
   }
 };
 
@@ -36,18 +36,27 @@ class Uniform final : public Encoding {
   std::vector<ParameterInfo> parameters() const override {
     return {{"level", "level whose cells the texture has", nullptr, "a level of the mesh, or null for the finest"}};
   }
+  void check_parameters(const Json& parameters) const override { level(parameters, std::numeric_limits<int>::max()); }
   Support supported(const ContextInfo&) const override { return {}; }
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
+  int level(const Json& parameters, int finest) const;
   Plan plan(const AmrHierarchy& hierarchy, const BuildRequest& request, const Json& parameters) const;
 };
 
+int Uniform::level(const Json& parameters, int finest) const {
+  if (parameters.at("level").is_null()) return finest;
+  const int level = integer_parameter(*this, parameters, "level");
+  if (level < 0 || level > finest)
+    throw UsageError(fmt::format("encoding uniform: parameter level is {}; accepted: 0 to {}, or null for the finest", level,
+                                 finest == std::numeric_limits<int>::max() ? "the mesh's finest level" : std::to_string(finest)));
+  return level;
+}
+
 Plan Uniform::plan(const AmrHierarchy& h, const BuildRequest& request, const Json& parameters) const {
   Plan p{};
-  p.level = parameters.at("level").is_null() ? h.finest_level() : integer_parameter(*this, parameters, "level");
-  if (p.level < 0 || p.level > h.finest_level())
-    throw UsageError(fmt::format("encoding uniform: parameter level is {}; accepted: 0 to {}, or null for the finest", p.level, h.finest_level()));
+  p.level = level(parameters, h.finest_level());
   p.cells = h.cells(p.level);
   p.blocks = ceil_div(p.cells, kBlock);
   p.validity = h.has_missing(request.field);
@@ -70,6 +79,7 @@ struct Writer {
   const BuildRequest& request;
   const Plan& plan;
   StorageScale scale;
+  double range_origin;
   HostTexture& values;
   HostTexture* ranges;
 
@@ -94,7 +104,7 @@ struct Writer {
         store_values(request.storage, scale, &v[box.offset({inner.lower.x, y, z})], static_cast<std::size_t>(inner.size().x), values.data.data(),
                      all.offset({inner.lower.x, y, z}));
     if (ranges != nullptr)
-      store_range(any ? range : ValueRange{}, request.storage, scale, ranges->as<float>() + 2 * Box{Vec3i(0), plan.blocks}.offset(b));
+      ranges->as<std::uint32_t>()[Box{Vec3i(0), plan.blocks}.offset(b)] = encode_range(any ? range : ValueRange{}, range_origin, request.storage, scale);
   }
 };
 
@@ -113,10 +123,10 @@ EncodedField Uniform::build(const AmrHierarchy& h, const BuildRequest& request) 
   values.holds_values = true;
   values.roles.payload = values.bytes();
   HostTexture validity = p.validity ? make_buffer("dense_validity", TexelFormat::r32ui, words_for_bits(p.cell_count())) : HostTexture{};
-  HostTexture ranges = p.ranges ? make_buffer("dense_ranges", TexelFormat::rg32f, p.block_count()) : HostTexture{};
+  HostTexture ranges = p.ranges ? make_buffer("dense_ranges", TexelFormat::r32ui, p.block_count()) : HostTexture{};
 
   std::vector<std::uint8_t> missing(p.validity ? static_cast<std::size_t>(p.cell_count()) : 0);
-  const Writer writer{h, request, p, field.scale, values, p.ranges ? &ranges : nullptr};
+  const Writer writer{h, request, p, field.scale, field.range_origin, values, p.ranges ? &ranges : nullptr};
   tbb::parallel_for(std::int64_t{0}, p.block_count(), [&](std::int64_t i) {
     const auto x = static_cast<int>(i % p.blocks.x);
     const auto y = static_cast<int>(i / p.blocks.x % p.blocks.y);
@@ -131,7 +141,7 @@ EncodedField Uniform::build(const AmrHierarchy& h, const BuildRequest& request) 
   if (p.validity) field.textures.push_back(std::move(validity));
   else field.left_out.push_back({"validity bits", "every cell has a value", 4 * words_for_bits(p.cell_count())});
   if (p.ranges) field.textures.push_back(std::move(ranges));
-  else field.left_out.push_back({"value ranges", "no region is skipped", 8 * p.block_count()});
+  else field.left_out.push_back({"value ranges", "no region is skipped", 4 * p.block_count()});
   field.statistics = {{"blocks", p.block_count()}};
   return field;
 }

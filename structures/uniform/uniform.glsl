@@ -14,16 +14,20 @@ UNIFORM(ivec3, u_dense_blocks)  // regions along each axis
 BUFFER(uint, dense_validity, dense_validity_block)  // one bit a cell, x fastest
 #endif
 #if AMRTEX_CPP || AMRTEX_VALUE_RANGES
-BUFFER(vec2r, dense_ranges, dense_ranges_block)  // minimum and maximum a block; minimum > maximum: no mesh
+BUFFER(uint, dense_ranges, dense_ranges_block)  // coded value range a block
 #endif
 
 bool locate(IN(Position) p, OUT(Region) r) {
   r.level = AMRTEX_DENSE_LEVEL;
-  r.width = u_level_width[AMRTEX_DENSE_LEVEL];
+  r.width = level_width(AMRTEX_DENSE_LEVEL);
   r.lower = ivec3(0);
   r.upper = u_domain_cells;
   r.value_range = vec2r(0);
   r.handle = ivec4(0);
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+  r.texture_scale = vec3r(1) / vec3r(u_dense_cells);
+  r.texture_lower = vec3r(0);
+#endif
 #if AMRTEX_CPP || AMRTEX_VALUE_RANGES
   if (AMRTEX_VALUE_RANGES != 0) {
     ivec3 block = divide_by_width(p.cell, r.width) / AMRTEX_DENSE_BLOCK;
@@ -32,8 +36,12 @@ bool locate(IN(Position) p, OUT(Region) r) {
     r.upper = min(r.lower + ivec3(block_width), u_domain_cells);
     ivec3 first = block * AMRTEX_DENSE_BLOCK;
     r.handle = ivec4(first.x, first.y, first.z, 0);
-    r.value_range = dense_ranges[block.x + u_dense_blocks.x * (block.y + u_dense_blocks.y * block.z)];
-    return r.value_range.x <= r.value_range.y;
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+    r.texture_lower = vec3r(first) * r.texture_scale;
+#endif
+    uint code = dense_ranges[block.x + u_dense_blocks.x * (block.y + u_dense_blocks.y * block.z)];
+    r.value_range = decode_range(code);
+    return code != AMRTEX_NO_RANGE;
   }
 #endif
   return true;
@@ -56,7 +64,7 @@ real fetch_field(IN(Region) r, IN(vec3r) q) {
 #endif
   if (AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) return decode_value(dense_texel(first + ivec3(floor(q))));
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
-  return decode_value(textureLod(tex_dense, (vec3r(first) + q) / vec3r(u_dense_cells), 0.0).x);
+  return decode_value(textureLod(tex_dense, r.texture_lower + q * r.texture_scale, 0.0).x);
 #else
   PRECISE vec3r from_centre = q - vec3r(0.5);
   vec3r whole = floor(from_centre);

@@ -1,0 +1,587 @@
+// The program `amrtex` as a user meets it: exit codes, messages, what it prints and what
+// it leaves on disk.
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <spawn.h>
+#include <stdlib.h>  // mkdtemp
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "bench/image_error.hpp"
+#include "bench/record.hpp"
+#include "renderers/picture.hpp"
+#include "structures/amrex_plotfile.hpp"
+#include "structures/synthetic.hpp"
+
+extern char** environ;
+
+namespace amrtex {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using testing::SizeIs;
+using testing::StartsWith;
+
+const std::string kData = AMRTEX_SOURCE_DIR "/data/amrex_tiny/plt00008";
+
+struct Result {
+  int exit_code = -1;  ///< minus the signal where it was killed
+  std::string out, err;
+};
+
+std::string read_text(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void write_text(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
+
+std::vector<std::string> names_in(const fs::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) names.push_back(entry.path().filename());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+class CommandLine : public testing::Test {
+ protected:
+  CommandLine() {
+    std::string name = (fs::temp_directory_path() / "amrtex_command_line_XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) throw Error("no temporary folder");
+    folder_ = name;
+  }
+  ~CommandLine() override { fs::remove_all(folder_); }
+
+  fs::path at(const std::string& name) const { return folder_ / name; }
+
+  Result amrtex(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), AMRTEX_PROGRAM);
+    std::vector<char*> argv;
+    for (std::string& a : arguments) argv.push_back(a.data());
+    argv.push_back(nullptr);
+    const std::string out = at(".out"), err = at(".err");
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+    posix_spawn_file_actions_addopen(&actions, 1, out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    posix_spawn_file_actions_addopen(&actions, 2, err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    pid_t child = 0;
+    const int error = posix_spawn(&child, AMRTEX_PROGRAM, &actions, nullptr, argv.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    if (error != 0) throw Error("cannot start " AMRTEX_PROGRAM);
+    int status = 0;
+    waitpid(child, &status, 0);
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), read_text(out), read_text(err)};
+  }
+
+  Json json_of(const std::vector<std::string>& arguments) const {
+    const Result r = amrtex(arguments);
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    return Json::parse(r.out);
+  }
+
+  std::string hash_of(const fs::path& data) const { return json_of({"info", data.string(), "--json"}).at("hash"); }
+
+  /// Writes an experiment file and returns its path.
+  std::string experiment_file(const Json& json) const {
+    write_text(at("e.json"), json.dump(1));
+    return at("e.json").string();
+  }
+  Result run(const Json& json, const std::vector<std::string>& options = {}) const {
+    std::vector<std::string> arguments = {"run", experiment_file(json), "--out", at("out").string()};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return amrtex(arguments);
+  }
+  Json counts_of_run(const Json& json) const {
+    const Result r = run(json, {"--json"});
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    EXPECT_THAT(r.err, IsEmpty()) << "silence in a pipe";
+    return Json::parse(r.out);
+  }
+  std::vector<Json> records() const { return load_records(at("out")); }
+  fs::path some_record() const { return at("out") / "records" / names_in(at("out") / "records").front(); }
+
+ private:
+  fs::path folder_;
+};
+
+/// One line that says what was wrong, and no trace of a crash.
+void expect_complaint(const Result& r, int exit_code, const testing::Matcher<const std::string&>& matcher) {
+  EXPECT_EQ(r.exit_code, exit_code) << r.err;
+  EXPECT_THAT(r.err, AllOf(StartsWith("amrtex: "), matcher));
+  EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+  for (const char* trace : {"what()", "terminate", "#0", "json.exception", "std::"}) EXPECT_THAT(r.err, Not(HasSubstr(trace)));
+}
+
+Json small_experiment() {
+  return {{"name", "small"},
+          {"datasets", {{{"file", kData}, {"field", "phi"}}}},
+          {"encodings", {{{"name", "uniform"}}, {{"name", "page_table"}, {"page_size", {8, 16}}}}},
+          {"filters", {"linear_page"}},
+          {"render", {{"sampling", "lattice"}, {"width", 32}, {"height", 32}}},
+          {"views", {{{"eye", {2.2, 1.8, 1.5}}, {"at", {0.5, 0.5, 0.5}}, {"fov_y", 35}}}},
+          {"transfer_function", {{"extinction", {{1.0, 0}, {1.9, 60}}}, {"color", {{1.0, 0, 0, 0.3}, {1.9, 0.8, 0, 0}}}}},
+          {"frames", 2},
+          {"warm_up", 0},
+          {"reference", {{"step", 0.25}}}};
+}
+
+Json with(Json json, const std::string& key, const Json& value) {
+  json[key] = value;
+  return json;
+}
+
+Json one_point() { return with(small_experiment(), "encodings", {{{"name", "page_table"}}}); }
+
+// --- usage ---
+
+TEST_F(CommandLine, EveryCommandHasHelpWithAnExample) {
+  for (const std::string command : {"encodings", "doctor", "info", "generate", "convert", "sample", "render", "run", "report"}) {
+    const Result r = amrtex({command, "--help"});
+    EXPECT_EQ(r.exit_code, 0) << command;
+    EXPECT_THAT(r.out, HasSubstr("Example: amrtex " + command));
+    EXPECT_THAT(r.err, IsEmpty());
+    EXPECT_THAT(amrtex({"--help"}).out, HasSubstr("\n  " + command));
+  }
+}
+
+TEST_F(CommandLine, FilesThatHelpNamesExist) {
+  EXPECT_TRUE(fs::exists(AMRTEX_SOURCE_DIR "/experiments/limits/scene.json"));
+  EXPECT_TRUE(fs::exists(AMRTEX_SOURCE_DIR "/experiments/quickstart/experiment.json"));
+  EXPECT_TRUE(fs::exists(AMRTEX_SOURCE_DIR "/docs/experiments.md"));
+  EXPECT_TRUE(fs::exists(AMRTEX_SOURCE_DIR "/docs/generate.md"));
+}
+
+TEST_F(CommandLine, UnknownCommandsAndOptionsNameTheAcceptedOnes) {
+  expect_complaint(amrtex({}), 2, AllOf(HasSubstr("encodings"), HasSubstr("report")));
+  expect_complaint(amrtex({"inform"}), 2, AllOf(HasSubstr("'inform'"), HasSubstr("info"), HasSubstr("run")));
+  expect_complaint(amrtex({"info", kData, "--jsn"}), 2, AllOf(HasSubstr("'--jsn'"), HasSubstr("--json")));
+  expect_complaint(amrtex({"info", kData, "more"}), 2, HasSubstr("'more'"));
+  expect_complaint(amrtex({"run"}), 2, AllOf(HasSubstr("experiment"), HasSubstr("amrtex run --help")));
+}
+
+TEST_F(CommandLine, UnknownNamesNameTheAcceptedOnes) {
+  write_text(at("p"), "0.5 0.5 0.5\n");
+  const auto sample = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"sample", kData, "--points", at("p").string()};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return amrtex(arguments);
+  };
+  expect_complaint(amrtex({"info", kData, "--field", "rho"}), 2, AllOf(HasSubstr("'rho'"), HasSubstr("phi")));
+  expect_complaint(sample({"--encoding", "octo", "--filter", "nearest"}), 2,
+                   AllOf(HasSubstr("uniform"), HasSubstr("page_table")));
+  expect_complaint(sample({"--encoding", "uniform", "--filter", "cubic"}), 2,
+                   AllOf(HasSubstr("linear_vertex"), HasSubstr("basis")));
+  const std::vector<std::string> known = {"--encoding", "page_table", "--filter", "nearest"};
+  const auto also = [&](const std::string& option, const std::string& value) {
+    std::vector<std::string> arguments = known;
+    arguments.insert(arguments.end(), {option, value});
+    return sample(arguments);
+  };
+  expect_complaint(also("--field", "rho"), 2, HasSubstr("phi"));
+  expect_complaint(also("--storage", "r64"), 2, HasSubstr("r8, r16, r16f, r32f"));
+  expect_complaint(also("--filtering", "soft"), 2, HasSubstr("hardware, manual"));
+  expect_complaint(also("--context", "glx"), 2, HasSubstr("egl, egl_device, osmesa"));
+  expect_complaint(also("--parameter", "page_size=5"), 2, AllOf(HasSubstr("page_table"), HasSubstr("4, 8, 16, 32, 64 or 128")));
+  expect_complaint(also("--parameter", "size=8"), 2, HasSubstr("page_size, centring"));
+  expect_complaint(also("--parameter", "page_size"), 2, HasSubstr("NAME=VALUE"));
+}
+
+TEST_F(CommandLine, MissingDataIsSaidClearly) {
+  expect_complaint(amrtex({"info", at("none").string()}), 1, AllOf(HasSubstr(at("none").string()), HasSubstr("no such")));
+  write_text(at("text"), "no mesh");
+  expect_complaint(amrtex({"info", at("text").string()}), 1, HasSubstr("AMReX plotfile"));
+  expect_complaint(amrtex({"run", at("none").string(), "--out", at("out").string()}), 1, HasSubstr(at("none").string()));
+  expect_complaint(amrtex({"report", at("none").string()}), 1, HasSubstr(at("none").string()));
+  expect_complaint(amrtex({"sample", kData, "--encoding", "uniform", "--filter", "nearest", "--points", at("none").string()}), 1,
+                   HasSubstr(at("none").string()));
+}
+
+// --- meshes ---
+
+TEST_F(CommandLine, InfoAgreesWithTheOracle) {
+  const Json oracle = Json::parse(read_text(AMRTEX_SOURCE_DIR "/data/amrex_tiny/oracle.json"));
+  const Json info = json_of({"info", kData, "--json"});
+  ASSERT_THAT(info.at("levels"), SizeIs(3));
+  for (std::size_t l = 0; l < 3; ++l) {
+    const Json& level = info["levels"][l];
+    EXPECT_EQ(level.at("level"), l);
+    EXPECT_EQ(level.at("patches"), oracle["levels"][l]["grids"]);
+    EXPECT_EQ(level.at("cells"), oracle["levels"][l]["cells"]);
+    EXPECT_EQ(level.at("leaf_cells"), oracle["levels"][l]["leaf_cells"]);
+    EXPECT_EQ(level.at("ratio_to_finer"), l < 2 ? 2 : 1);
+  }
+  EXPECT_EQ(info.at("leaf_cells"), oracle["total_leaf_cells"]);
+  EXPECT_EQ(info.at("domain").at("lower"), Json({0.0, 0.0, 0.0}));
+  EXPECT_EQ(info.at("domain").at("upper"), Json({1.0, 1.0, 1.0}));
+  ASSERT_THAT(info.at("fields"), SizeIs(1));
+  const Json& field = info["fields"][0];
+  const Json& expected = oracle["fields"]["boxlib/phi"];
+  EXPECT_EQ(field.at("name"), "phi");
+  EXPECT_EQ(field.at("min"), expected["min"]);
+  EXPECT_EQ(field.at("max"), expected["max"]);
+  EXPECT_NEAR(field.at("volume_integral"), expected["sum_value_times_volume_code"], 1e-12);
+  EXPECT_THAT(info.at("hash").get<std::string>(), SizeIs(testing::Ge(16U)));
+}
+
+TEST_F(CommandLine, InfoToRead) {
+  const Result r = amrtex({"info", kData});
+  EXPECT_EQ(r.exit_code, 0);
+  EXPECT_THAT(r.out, AllOf(HasSubstr("leaf cells  25600"), HasSubstr("phi"), HasSubstr("ratio to finer")));
+}
+
+TEST_F(CommandLine, GenerateThenInfo) {
+  const std::string spec = R"({"field": "shell", "levels": 3, "root": 16, "patch": 8})";
+  const std::string mesh = at("shell");
+  EXPECT_EQ(amrtex({"generate", spec, "-o", mesh}).exit_code, 0);
+  const AmrHierarchy expected(generate_mesh(Json::parse(spec)));
+  const Json info = json_of({"info", mesh, "--json"});
+  EXPECT_EQ(info.at("leaf_cells"), expected.leaf_cells());
+  EXPECT_EQ(info.at("fields")[0].at("name"), "shell");
+  EXPECT_EQ(info.at("hash"), expected.content_hash(0));
+
+  write_text(at("spec.json"), spec);
+  EXPECT_EQ(amrtex({"generate", at("spec.json"), "-o", at("again")}).exit_code, 0);
+  EXPECT_EQ(hash_of(at("again")), info.at("hash"));
+  expect_complaint(amrtex({"generate", spec, "-o", mesh}), 1, HasSubstr("exists already"));
+}
+
+TEST_F(CommandLine, BadSpecificationsWriteNothing) {
+  const std::string mesh = at("mesh");
+  expect_complaint(amrtex({"generate", R"({"levls": 3})", "-o", mesh}), 2, AllOf(HasSubstr("levls"), HasSubstr("levels")));
+  expect_complaint(amrtex({"generate", R"({"levels": 99})", "-o", mesh}), 2, AllOf(HasSubstr("levels"), HasSubstr("99")));
+  expect_complaint(amrtex({"generate", R"({"levels": )", "-o", mesh}), 2, HasSubstr("not valid JSON"));
+  expect_complaint(amrtex({"generate", at("none"), "-o", mesh}), 2, HasSubstr("a JSON file"));
+  EXPECT_FALSE(fs::exists(mesh));
+}
+
+TEST_F(CommandLine, ConvertKeepsTheHash) {
+  const std::string copy = at("copy");
+  EXPECT_EQ(amrtex({"convert", kData, copy}).exit_code, 0);
+  EXPECT_EQ(hash_of(copy), hash_of(kData));
+  expect_complaint(amrtex({"convert", kData, copy}), 1, HasSubstr("exists already"));
+  expect_complaint(amrtex({"convert", kData, at("other"), "--field", "rho"}), 2, HasSubstr("phi"));
+  EXPECT_FALSE(fs::exists(at("other")));
+}
+
+// --- contexts ---
+
+TEST_F(CommandLine, EncodingsTellFiltersAndParameters) {
+  const Json list = json_of({"encodings", "--json"});
+  std::vector<std::string> names;
+  for (const Json& e : list) {
+    names.push_back(e.at("name"));
+    EXPECT_THAT(e.at("filters"), Not(IsEmpty()));
+    for (const Json& p : e.at("parameters"))
+      for (const char* key : {"name", "description", "default", "accepted"}) EXPECT_TRUE(p.contains(key)) << p;
+    EXPECT_NE(e.at("supported").get<bool>(), e.at("reason").is_string()) << e;
+  }
+  std::vector<std::string> expected;
+  for (const Encoding* e : all_encodings()) expected.emplace_back(e->name());
+  EXPECT_EQ(names, expected);
+}
+
+TEST_F(CommandLine, DoctorTellsWhatIsThereAndWhyNot) {
+  const Json all = json_of({"doctor", "--json"});
+  for (const char* kind : {"egl", "egl_device", "osmesa", "egl_zink"}) {
+    const Json& entry = all.at(kind);
+    if (entry.at("available").get<bool>()) {
+      EXPECT_TRUE(entry.at("reason").is_null());
+      EXPECT_FALSE(entry.at("info").at("renderer").get<std::string>().empty());
+      EXPECT_THAT(entry.at("encodings"), SizeIs(all_encodings().size()));
+    } else {
+      EXPECT_FALSE(entry.at("reason").get<std::string>().empty()) << kind;
+    }
+  }
+}
+
+// --- sampling ---
+
+TEST_F(CommandLine, SampleAgreesWithTheOracle) {
+  const Json oracle = Json::parse(read_text(AMRTEX_SOURCE_DIR "/data/amrex_tiny/oracle.json"));
+  const Json& expected = oracle["point_samples"]["samples"];
+  std::string points = "# world units\n\n";
+  for (const Json& s : expected) points += fmt::format("{} {} {}\n", s["p"][0].dump(), s["p"][1].dump(), s["p"][2].dump());
+  write_text(at("p"), points);
+  const Json samples =
+      json_of({"sample", kData, "--encoding", "page_table", "--filter", "nearest", "--points", at("p"), "--json"});
+  ASSERT_EQ(samples.size(), expected.size());
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const double value = expected[i]["value"];
+    EXPECT_EQ(samples[i].at("p"), expected[i]["p"]);
+    EXPECT_EQ(samples[i].at("level"), expected[i]["level"]);
+    EXPECT_EQ(samples[i].at("reference"), value);
+    EXPECT_EQ(samples[i].at("encoding_double"), value);
+    EXPECT_EQ(samples[i].at("encoding_gl"), static_cast<double>(static_cast<float>(value)));
+  }
+}
+
+TEST_F(CommandLine, SampleOutsideIsNull) {
+  write_text(at("p"), "0.51 0.52 0.53\n1.5 0 0\n");
+  for (const auto& [encoding, filter, parameter] :
+       std::vector<std::array<std::string, 3>>{{"uniform", "linear_page", "level=2"},
+                                               {"page_table", "linear_page", "page_size=8"},
+                                               {"page_table", "linear_vertex", "centring=node"}}) {
+    const Json samples = json_of(
+        {"sample", kData, "--encoding", encoding, "--filter", filter, "--parameter", parameter, "--points", at("p"), "--json"});
+    ASSERT_THAT(samples, SizeIs(2));
+    const double reference = samples[0].at("reference");
+    EXPECT_NEAR(samples[0].at("encoding_double"), reference, 1e-12) << encoding << " " << filter;
+    EXPECT_NEAR(samples[0].at("encoding_gl"), reference, 1e-6) << encoding << " " << filter;
+    for (const char* key : {"level", "reference", "encoding_double", "encoding_gl"})
+      EXPECT_TRUE(samples[1].at(key).is_null()) << key;
+  }
+}
+
+TEST_F(CommandLine, SampleToRead) {
+  write_text(at("p"), "0.51 0.52 0.53\n1.5 0 0\n");
+  const Result r = amrtex({"sample", kData, "--encoding", "uniform", "--filter", "nearest", "--points", at("p")});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.out, AllOf(HasSubstr("encoding double"), HasSubstr("encoding GL"), HasSubstr("0.53"), HasSubstr(" - ")));
+  EXPECT_EQ(std::count(r.out.begin(), r.out.end(), '\n'), 3);
+}
+
+TEST_F(CommandLine, SampleSaysWhichLineIsNoPoint) {
+  write_text(at("p"), "0.5 0.5 0.5\n0.5 0.5\n");
+  expect_complaint(amrtex({"sample", kData, "--encoding", "uniform", "--filter", "nearest", "--points", at("p")}), 1,
+                   AllOf(HasSubstr("line 2"), HasSubstr("x y z")));
+}
+
+TEST_F(CommandLine, SampleWithAFilterThatTheEncodingLacks) {
+  write_text(at("p"), "0.5 0.5 0.5\n");
+  expect_complaint(amrtex({"sample", kData, "--encoding", "uniform", "--filter", "basis", "--points", at("p")}), 1,
+                   HasSubstr("it has nearest, linear_page"));
+}
+
+// --- pictures ---
+
+int big_endian(const std::string& bytes, std::size_t at) {
+  int value = 0;
+  for (std::size_t i = at; i < at + 4; ++i) value = value * 256 + static_cast<unsigned char>(bytes.at(i));
+  return value;
+}
+
+TEST_F(CommandLine, RenderWritesPngAndFloats) {
+  const std::string scene =
+      experiment_file(with(one_point(), "render", {{"sampling", "adaptive"}, {"step", 0.5}, {"width", 40}, {"height", 24}}));
+  EXPECT_EQ(amrtex({"render", scene, "-o", at("a.png")}).exit_code, 0);
+  const std::string png = read_text(at("a.png"));
+  EXPECT_THAT(png, StartsWith("\x89PNG"));
+  EXPECT_EQ(big_endian(png, 16), 40);
+  EXPECT_EQ(big_endian(png, 20), 24);
+
+  EXPECT_EQ(amrtex({"render", scene, "-o", at("a.npy")}).exit_code, 0);
+  EXPECT_EQ(amrtex({"render", scene, "-o", at("r.npy"), "--reference"}).exit_code, 0);
+  const Picture picture = read_npy(at("a.npy"));
+  const Picture reference = read_npy(at("r.npy"));
+  EXPECT_EQ(picture.width, 40);
+  EXPECT_EQ(picture.height, 24);
+  EXPECT_EQ(picture.channels, 4);
+  EXPECT_TRUE(reaches_psnr(compare(picture, reference), 45)) << compare(picture, reference).psnr_db.value_or(0);
+  EXPECT_GT(*std::max_element(picture.values.begin(), picture.values.end()), 0.1) << "an empty picture";
+}
+
+TEST_F(CommandLine, RenderOfAValueHasOneChannelAndAColorBar) {
+  const std::string scene = experiment_file(with(one_point(), "render", {{"mode", "projection"}, {"width", 32}, {"height", 64}}));
+  EXPECT_EQ(amrtex({"render", scene, "-o", at("a.npy")}).exit_code, 0);
+  EXPECT_EQ(read_npy(at("a.npy")).channels, 1);
+  EXPECT_EQ(amrtex({"render", scene, "-o", at("a.png"), "--color-bar"}).exit_code, 0);
+  EXPECT_GT(big_endian(read_text(at("a.png")), 16), 32) << "the bar stands beside the picture";
+}
+
+TEST_F(CommandLine, RenderRefusesWhatIsNoSceneOrNoPicture) {
+  const std::string axes = experiment_file(small_experiment());
+  expect_complaint(amrtex({"render", axes, "-o", at("a.png")}), 2, HasSubstr("encodings"));
+  const std::string scene = experiment_file(one_point());
+  expect_complaint(amrtex({"render", scene, "-o", at("a.tif")}), 2, AllOf(HasSubstr(".png"), HasSubstr(".npy")));
+  expect_complaint(amrtex({"render", scene, "-o", at("a.png"), "--memory-limit", "much"}), 2, HasSubstr("512MiB"));
+  expect_complaint(amrtex({"render", scene, "-o", at("a.png"), "--memory-limit", "1KiB"}), 1, HasSubstr("bytes"));
+  write_text(at("file"), "x");
+  expect_complaint(amrtex({"render", scene, "-o", at("file") / "a.png"}), 1, HasSubstr("a.png"));
+  EXPECT_FALSE(fs::exists(at("a.png")));
+}
+
+// --- experiments ---
+
+TEST_F(CommandLine, RunWritesValidRecordsPicturesAndTables) {
+  const Result r = run(small_experiment());
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.err, IsEmpty());
+  EXPECT_THAT(r.out, AllOf(HasSubstr("| page_table (page_size 8) |"), HasSubstr("3 points measured, 0 kept")));
+  const std::vector<Json> all = records();  // validates each
+  ASSERT_THAT(all, SizeIs(3));
+  for (const Json& record : all) {
+    EXPECT_EQ(record.at("status"), "ok");
+    EXPECT_EQ(record.at("experiment"), "small");
+    EXPECT_EQ(record.at("dataset").at("hash"), hash_of(kData));
+    EXPECT_EQ(record.at("frame").at("all_wall_ms").size(), 2U);
+    EXPECT_GT(record.at("work").at("samples"), 0);
+    EXPECT_GT(record.at("error").at("psnr_db"), 40);
+    EXPECT_EQ(record.at("error_common").at("filter"), "linear_vertex");
+    EXPECT_FALSE(record.at("image_hash").get<std::string>().empty());
+  }
+  EXPECT_THAT(names_in(at("out")), ElementsAre("pictures", "records", "references", "table.csv", "table.md", "table.tex"));
+  EXPECT_THAT(names_in(at("out") / "pictures"), SizeIs(3));
+  for (const std::string& name : names_in(at("out") / "records")) EXPECT_THAT(name, testing::EndsWith(".json"));
+}
+
+TEST_F(CommandLine, RunGoesOnWhereItStopped) {
+  EXPECT_EQ(counts_of_run(small_experiment()).at("measured"), 3);
+  std::map<std::string, std::string> before;
+  for (const std::string& name : names_in(at("out") / "records")) before[name] = read_text(at("out") / "records" / name);
+
+  const Json kept = counts_of_run(small_experiment());
+  EXPECT_EQ(kept, Json({{"measured", 0}, {"kept", 3}, {"unsupported", 0}, {"over_budget", 0}, {"failed", 0}}));
+
+  // as if it had been killed: one point has no record yet, and a temporary file is left
+  const fs::path lost = some_record();
+  fs::remove(lost);
+  write_text(at("out") / "records" / ".half.tmp", "{");
+  const Json resumed = counts_of_run(small_experiment());
+  EXPECT_EQ(resumed.at("measured"), 1);
+  EXPECT_EQ(resumed.at("kept"), 2);
+  EXPECT_TRUE(fs::exists(lost));
+  for (const auto& [name, text] : before) {
+    if (name != lost.filename()) {
+      EXPECT_EQ(read_text(at("out") / "records" / name), text) << "a kept record was written again";
+    }
+  }
+  EXPECT_THAT(records(), SizeIs(3));
+}
+
+TEST_F(CommandLine, ForceMeasuresAgain) {
+  EXPECT_EQ(counts_of_run(one_point()).at("measured"), 1);
+  const std::string before = read_text(some_record());
+  const Result r = run(one_point(), {"--force", "--json"});
+  EXPECT_EQ(Json::parse(r.out).at("measured"), 1);
+  EXPECT_EQ(Json::parse(r.out).at("kept"), 0);
+  EXPECT_NE(read_text(some_record()), before);
+  EXPECT_THAT(records(), SizeIs(1));
+}
+
+TEST_F(CommandLine, ReportMakesTheTablesFromRecordsAlone) {
+  EXPECT_EQ(counts_of_run(small_experiment()).at("measured"), 3);
+  const std::string table = read_text(at("out") / "table.md");
+  for (const char* name : {"table.md", "table.csv", "table.tex", "pictures", "references"}) fs::remove_all(at("out") / name);
+  const Result r = amrtex({"report", at("out")});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_EQ(read_text(at("out") / "table.md"), table);
+  EXPECT_THAT(r.out, HasSubstr("| page_table (page_size 16) |"));
+  EXPECT_THAT(read_text(at("out") / "table.tex"), HasSubstr("\\toprule"));
+  EXPECT_THAT(read_text(at("out") / "table.csv"), HasSubstr("page_table"));
+
+  write_text(at("columns.json"), R"(["encoding", "total"])");
+  EXPECT_THAT(amrtex({"report", at("out"), "--columns", at("columns.json")}).out, HasSubstr("| encoding | total (MiB) |"));
+  write_text(at("columns.json"), R"(["encoding", "totl"])");
+  expect_complaint(amrtex({"report", at("out"), "--columns", at("columns.json")}), 2,
+                   AllOf(HasSubstr("totl"), HasSubstr("total")));
+}
+
+TEST_F(CommandLine, ReportNamesABrokenRecord) {
+  EXPECT_EQ(counts_of_run(one_point()).at("measured"), 1);
+  write_text(some_record(), "{");
+  EXPECT_EQ(amrtex({"report", at("out")}).exit_code, 1);
+  EXPECT_THAT(amrtex({"report", at("out")}).err, HasSubstr(some_record().filename().string()));
+}
+
+TEST_F(CommandLine, BrokenExperimentFilesNameLineAndKey) {
+  const auto complaint = [&](const std::string& text) {
+    write_text(at("e.json"), text);
+    return amrtex({"run", at("e.json"), "--out", at("out")});
+  };
+  const std::string head = "{\n \"name\": \"x\",\n";
+  const std::string mesh = " \"datasets\": [{\"generate\": {\"levels\": 1, \"root\": 16}}],\n";
+  expect_complaint(complaint(head + " \"datasets\": [\n}"), 2, HasSubstr("e.json:4:"));
+  expect_complaint(complaint(head + " \"dataset\": []\n}"), 2,
+                   AllOf(HasSubstr("e.json:3:"), HasSubstr("did you mean 'datasets'")));
+  expect_complaint(complaint(head + mesh + " \"encodings\": [{\"name\": \"octo\"}]\n}"), 2,
+                   AllOf(HasSubstr("e.json:4:"), HasSubstr("encodings[0].name"), HasSubstr("page_table")));
+  expect_complaint(complaint(head + mesh + " \"encodings\": [{\"name\": \"page_table\", \"page\": 8}]\n}"), 2,
+                   AllOf(HasSubstr("e.json:4:"), HasSubstr("page_size")));
+  const std::string valid = head + mesh + " \"encodings\": [{\"name\": \"uniform\"}],\n";
+  expect_complaint(complaint(valid + " \"filters\": [\"nearest\", \"cubic\"]\n}"), 2,
+                   AllOf(HasSubstr("e.json:5:"), HasSubstr("filters[1]"), HasSubstr("linear_vertex")));
+  expect_complaint(complaint(valid + " \"storage\": \"r7\"\n}"), 2, AllOf(HasSubstr("e.json:5: storage"), HasSubstr("r16f")));
+  Json bad = small_experiment();
+  bad["render"]["step"] = "one";
+  expect_complaint(run(bad), 2, HasSubstr("render.step"));
+  expect_complaint(run(with(small_experiment(), "datasets", {{{"file", "no/mesh"}}})), 2,
+                   AllOf(HasSubstr("datasets[0].file"), HasSubstr("no/mesh")));
+  EXPECT_FALSE(fs::exists(at("out"))) << "exit 2 comes before any work";
+}
+
+TEST_F(CommandLine, ABadPageSizeIsBadUsage) {
+  expect_complaint(run(with(small_experiment(), "encodings", {{{"name", "page_table"}, {"page_size", 5}}})), 2,
+                   HasSubstr("4, 8, 16, 32, 64 or 128"));
+}
+
+TEST_F(CommandLine, AFilterThatAnEncodingLacksIsARecord) {
+  const Result r = run(with(one_point(), "filters", {"basis", "linear_page"}));
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.out, HasSubstr("1 points measured, 0 kept, 1 unsupported"));
+  int unsupported = 0;
+  for (const Json& record : records()) {
+    if (record.at("filter") != "basis") continue;
+    ++unsupported;
+    EXPECT_EQ(record.at("status"), "unsupported");
+    EXPECT_THAT(record.at("reason").get<std::string>(), HasSubstr("nearest, linear_page, linear_vertex"));
+    EXPECT_TRUE(record.at("frame").is_null());
+  }
+  EXPECT_EQ(unsupported, 1);
+  EXPECT_THAT(read_text(at("out") / "table.md"), HasSubstr("unsupported: ")) << "the row stays";
+}
+
+TEST_F(CommandLine, AMemoryLimitIsARecord) {
+  const Result r = run(one_point(), {"--memory-limit", "64KiB"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  ASSERT_THAT(records(), SizeIs(1));
+  EXPECT_EQ(records()[0].at("status"), "over_budget");
+  EXPECT_THAT(records()[0].at("reason").get<std::string>(), AllOf(HasSubstr("page_table"), HasSubstr("65536 bytes")));
+  expect_complaint(run(one_point(), {"--memory-limit", "64kilo"}), 2, HasSubstr("512MiB"));
+}
+
+TEST_F(CommandLine, ATextureLargerThanTheContextIsARecordBeforeAllocation) {
+  Json deep = with(one_point(), "datasets", {{{"generate", {{"field", "linear"}, {"levels", 9}, {"refine", "nested"}}}}});
+  deep["encodings"] = {{{"name", "uniform"}}};
+  EXPECT_EQ(run(deep).exit_code, 0);
+  ASSERT_THAT(records(), SizeIs(1));
+  EXPECT_EQ(records()[0].at("status"), "unsupported");
+  EXPECT_THAT(records()[0].at("reason").get<std::string>(), HasSubstr("16384 x 16384 x 16384"));
+  fs::remove_all(at("out"));
+  EXPECT_EQ(run(deep, {"--memory-limit", "1GiB"}).exit_code, 0);
+  EXPECT_EQ(records()[0].at("status"), "over_budget");
+}
+
+TEST_F(CommandLine, AWrongPictureFailsAndGetsNoTime) {
+  Json coarse = with(one_point(), "check", {{"psnr_db", 200}});
+  const Result r = run(coarse);
+  EXPECT_EQ(r.exit_code, 1) << "a point that failed";
+  ASSERT_THAT(records(), SizeIs(1));
+  EXPECT_EQ(records()[0].at("status"), "failed");
+  EXPECT_THAT(records()[0].at("reason").get<std::string>(), HasSubstr("psnr_db"));
+  EXPECT_TRUE(records()[0].at("frame").is_null());
+  EXPECT_FALSE(records()[0].at("error").is_null());
+}
+
+TEST_F(CommandLine, AnOutputFolderThatCannotBeWrittenLeavesNothing) {
+  write_text(at("file"), "mine");
+  const std::string file = experiment_file(one_point());
+  expect_complaint(amrtex({"run", file, "--out", at("file") / "out"}), 1, HasSubstr((at("file") / "out").string()));
+  expect_complaint(amrtex({"run", file, "--out", at("file")}), 1, HasSubstr(at("file").string()));
+  EXPECT_EQ(read_text(at("file")), "mine");
+  EXPECT_THAT(names_in(at("")), ElementsAre(".err", ".out", "e.json", "file"));
+}
+
+}  // namespace
+}  // namespace amrtex

@@ -1,0 +1,480 @@
+// What every encoding must do: reproduce the filter's mathematics at every kind of place, on the
+// CPU in double and float and on the GL contexts. Table-driven over the registry.
+#include <gtest/gtest.h>
+
+#include "renderers/scene_bindings.hpp"
+#include "shaders/shader_library.hpp"
+#include "tests/encoding_cases.hpp"
+
+namespace amrtex {
+namespace {
+
+using namespace test;
+
+const std::vector<NamedMesh>& meshes() {
+  static const std::vector<NamedMesh> all = conformance_meshes();
+  return all;
+}
+
+bool power_of_two(const AmrHierarchy& h) {
+  for (int l = 0; l < h.finest_level(); ++l)
+    if ((h.ratio_to_finer(l) & (h.ratio_to_finer(l) - 1)) != 0) return false;
+  return true;
+}
+
+/// Of conformance_meshes().
+enum Mesh : std::size_t { single, nested_2, nested_4_2, nested_3_2, jump, holes, holes_3, one_cell };
+const std::vector<std::size_t> kAllMeshes{single, nested_2, nested_4_2, nested_3_2, jump, holes, holes_3, one_cell};
+
+template <class F>
+void for_each_case(const std::vector<std::size_t>& which, F&& f) {
+  for (const std::size_t mesh : which)
+    for (const EncodingCase& c : encoding_cases()) {
+      SCOPED_TRACE(meshes()[mesh].name + ": " + c.name());
+      f(meshes()[mesh].hierarchy, c);
+    }
+}
+
+/// Compiling a shader is what these tests take their time for: the second context sees fewer meshes.
+std::vector<std::size_t> meshes_on(ContextKind kind) {
+  if (kind == ContextKind::egl) return {single, nested_2, nested_3_2, jump, holes};
+  return {nested_2, holes};
+}
+
+TEST(Cases, CoverEveryEncodingAndFilter) {
+  for (const Encoding* e : all_encodings())
+    for (const Filter filter : e->filters())
+      EXPECT_TRUE(std::any_of(encoding_cases().begin(), encoding_cases().end(),
+                              [&](const EncodingCase& c) { return c.encoding == e && c.filter == filter; }))
+          << e->name() << " " << filter_name(filter);
+}
+
+// ---- the encoding ----
+
+TEST(Conformance, DoubleIsTheReference) {
+  for_each_case(kAllMeshes, [](const AmrHierarchy& h, const EncodingCase& c) {
+    const auto positions = probe_positions(h, 60);
+    for (const bool ranges : {true, false}) {
+      const EncodedField field = build(h, c, {.storage = Storage::r64f, .value_ranges = ranges});
+      EXPECT_EQ(field.definition.filter, c.filter);
+      const Comparison result = compare_double(h, field, positions);
+      EXPECT_TRUE(result) << result;
+    }
+  });
+}
+
+TEST(Conformance, TheDomainsLastFaceBelongsToItsLastCellAndBeyondIsNothing) {
+  for_each_case({single, holes}, [](const AmrHierarchy& h, const EncodingCase& c) {
+    const EncodedField field = build(h, c, {.storage = Storage::r64f});
+    const Vec3d upper = h.domain_upper();
+    const Vec3d lower = h.domain_lower();
+    const Vec3d size = upper - lower;
+    std::vector<FinestPosition> positions;
+    for (int a = 0; a < 3; ++a)
+      for (const double at : {lower[a], upper[a]}) {
+        Vec3d p = lower + size * Vec3d(0.37, 0.62, 0.81);
+        p[a] = at;
+        const auto position = finest_position(h, p);
+        ASSERT_TRUE(position);
+        positions.push_back(*position);
+        p[a] = at == upper[a] ? std::nextafter(at, kInf) : std::nextafter(at, -kInf);
+        EXPECT_FALSE(finest_position(h, p)) << "one ulp outside";
+      }
+    positions.push_back(finest_position(h, upper).value());
+    const Comparison result = compare_double(h, field, positions);
+    EXPECT_TRUE(result) << result;
+
+    // cells outside the domain hold nothing
+    const Vec3i last = h.cells(h.finest_level()) - Vec3i(1);
+    const std::vector<FinestPosition> outside{{{-1, 0, 0}, Vec3d(0.5)},
+                                              {{0, -1, 0}, Vec3d(kBelowOne)},
+                                              {{0, 0, -5}, Vec3d(0)},
+                                              {last + Vec3i(1), Vec3d(0)},
+                                              {{last.x, last.y + 1, last.z}, Vec3d(0)}};
+    for (const ProbeResult& r : probe_on_cpu(h, field, Precision::double_precision, outside)) EXPECT_FALSE(r.found);
+    const EncodedField floats = build(h, c);
+    Context& egl = context(ContextKind::egl);
+    for (const ProbeResult& r : probe_on_gl(egl, h, floats, GpuField(floats, egl), outside)) EXPECT_FALSE(r.found);
+  });
+}
+
+TEST(Conformance, FractionsThatRoundToOneStayInTheirCell) {
+  // the largest double below 1 is no float below 1
+  const double below = std::nextafter(1.0, 0.0);
+  const AmrHierarchy h = single_level(waves).hierarchy();
+  const std::vector<FinestPosition> positions{
+      {{2, 3, 4}, Vec3d(below)}, {{3, 3, 3}, {below, 0.5, 0.5}}, {{7, 7, 7}, {0.5, below, below}}};
+  for (const EncodingCase& c : encoding_cases()) {
+    SCOPED_TRACE(c.name());
+    const EncodedField field = build(h, c);
+    const Values expected = reference_values(h, field.definition, positions);
+    const Comparison on_cpu =
+        compare(positions, expected, probe_on_cpu(h, field, Precision::single_precision, positions), 1e-5 * value_range(h));
+    EXPECT_TRUE(on_cpu) << on_cpu;
+    Context& egl = context(ContextKind::egl);
+    const Comparison on_gl =
+        compare(positions, expected, probe_on_gl(egl, h, field, GpuField(field, egl), positions), 1e-5 * value_range(h));
+    EXPECT_TRUE(on_gl) << on_gl;
+  }
+}
+
+// ---- arithmetic: GL and CPU in float ----
+
+TEST(Conformance, ManualFilteringOnGlIsTheReferenceAndTheCpusBits) {
+  for (const ContextKind kind : kContexts)
+    for_each_case(meshes_on(kind), [&](const AmrHierarchy& h, const EncodingCase& c) {
+      SCOPED_TRACE(context_kind_name(kind));
+      const auto positions = probe_positions(h, 40);
+      const EncodedField field = build(h, c);
+      Context& gl = context(kind);
+      const auto on_gl = probe_on_gl(gl, h, field, GpuField(field, gl), positions);
+      const Comparison with_reference =
+          compare(positions, reference_values(h, field.definition, positions), on_gl, 1e-5 * value_range(h));
+      EXPECT_TRUE(with_reference) << with_reference;
+      const auto on_cpu = probe_on_cpu(h, field, Precision::single_precision, positions);
+      const Comparison bits = compare(positions, values_of(on_cpu), on_gl, power_of_two(h) ? 0 : 1e-5 * value_range(h));
+      EXPECT_TRUE(bits) << "CPU float: " << bits;
+      for (std::size_t i = 0; i < positions.size(); ++i)
+        if (on_gl[i].found) {
+          EXPECT_EQ(on_gl[i].level, on_cpu[i].level);
+        }
+    });
+}
+
+TEST(Conformance, HardwareFilteringDiffersByTheTextureCoordinateAlone) {
+  // the normalised coordinate of a float costs 2^-14 of the local difference an axis (DESIGN 4); 2^-12 covers three and the
+  // weights' rounding
+  for (const ContextKind kind : kContexts)
+    for_each_case(meshes_on(kind), [&](const AmrHierarchy& h, const EncodingCase& c) {
+      if (c.filter == Filter::nearest) return;
+      SCOPED_TRACE(context_kind_name(kind));
+      const auto positions = probe_positions(h, 40);
+      const EncodedField field = build(h, c, {.filtering = Filtering::hardware});
+      EXPECT_EQ(field.filtering, Filtering::hardware);
+      Context& gl = context(kind);
+      const auto on_gl = probe_on_gl(gl, h, field, GpuField(field, gl), positions);
+      const Comparison result = compare(positions, reference_values(h, field.definition, positions), on_gl, [&](std::size_t i) {
+        return 0x1p-12 * local_range(h, on_gl[i].level, positions[i]) + 1e-5 * value_range(h);
+      });
+      EXPECT_TRUE(result) << result;
+    });
+}
+
+TEST(Conformance, NearestHasTheLeafsBitsInEveryEncoding) {
+  Context& gl = context(ContextKind::egl);
+  for_each_case(kAllMeshes, [&](const AmrHierarchy& h, const EncodingCase& c) {
+    if (c.filter != Filter::nearest) return;
+    const auto positions = probe_positions(h, 60);
+    Values leaves;
+    for (const FinestPosition& p : positions) {
+      const auto leaf = h.find_leaf(p.cell);
+      const double v = leaf ? h.value(*leaf, 0) : kNan;
+      leaves.push_back(std::isnan(v) ? std::nullopt : std::optional(static_cast<double>(static_cast<float>(v))));
+    }
+    const EncodedField field = build(h, c);
+    const Comparison on_gl = compare(positions, leaves, probe_on_gl(gl, h, field, GpuField(field, gl), positions), 0.0);
+    EXPECT_TRUE(on_gl) << on_gl;
+    const Comparison on_cpu = compare(positions, leaves, probe_on_cpu(h, field, Precision::single_precision, positions), 0.0);
+    EXPECT_TRUE(on_cpu) << on_cpu;
+  });
+}
+
+// ---- storage ----
+
+TEST(Conformance, StorageErrsByHalfAQuantum) {
+  struct Case {
+    Storage storage;
+    double bound;  // of the field's range
+  };
+  // codes are in [0, 1]: half a step of 1/255 and 1/65535; half precision has 11 bits below 1
+  constexpr std::array<Case, 3> kStorages{{{Storage::r8, 0.5 / 255}, {Storage::r16, 0.5 / 65535}, {Storage::r16f, 0x1p-12}}};
+  Context& gl = context(ContextKind::egl);
+  for (const auto& [storage, bound] : kStorages)
+    for (const std::size_t mesh : {storage == Storage::r16 ? holes : nested_2}) {
+      const AmrHierarchy& h = meshes()[mesh].hierarchy;
+      const auto positions = probe_positions(h, 60);
+      for (const EncodingCase& c : encoding_cases()) {
+        SCOPED_TRACE(fmt::format("{} {}: {}", format_name(storage), meshes()[mesh].name, c.name()));
+        const EncodedField field = build(h, c, {.storage = storage});
+        EXPECT_EQ(field.storage, storage);
+        EXPECT_EQ(field.scale.offset, h.statistics(0).min);
+        EXPECT_EQ(field.scale.scale, value_range(h));
+        const Values expected = reference_values(h, field.definition, positions);
+        const auto in_double = probe_on_cpu(h, field, Precision::double_precision, positions);
+        const Comparison exact = compare(positions, expected, in_double, (bound + 1e-12) * value_range(h));
+        EXPECT_TRUE(exact) << exact;
+        EXPECT_GT(exact.worst, bound * value_range(h) / 16) << "the payload is of this storage";
+        const Comparison on_gl = compare(positions, expected, probe_on_gl(gl, h, field, GpuField(field, gl), positions),
+                                         (bound + 1e-6) * value_range(h));
+        EXPECT_TRUE(on_gl) << on_gl;
+      }
+    }
+}
+
+// ---- regions ----
+
+/// What locate() says of a position, beside the value.
+struct RegionProbe {
+  glm::vec4 value;   // value, found, smallest, largest value of the region
+  glm::ivec4 lower;  // and its level
+  glm::ivec4 upper;  // and its width
+};
+
+constexpr const char* kRegionProbe = R"(#include "portable_glsl.h"
+#include "contract.glsl"
+layout(local_size_x = 64) in;
+struct Probe { vec4 value; ivec4 lower; ivec4 upper; };
+layout(std430) readonly buffer cells_block { ivec4 cells[]; };
+layout(std430) readonly buffer fractions_block { vec4 fractions[]; };
+layout(std430) writeonly buffer probes_block { Probe probes[]; };
+uniform int u_count;
+void main() {
+  int i = int(gl_GlobalInvocationID.x);
+  if (i >= u_count) return;
+  Position p;
+  p.cell = cells[i].xyz;
+  p.fraction = fractions[i].xyz;
+  Region r;
+  bool inside = locate(p, r);
+  FieldSample s;
+  bool found = sample_field(p, s);
+  probes[i].value = vec4(found ? s.value : 0.0, inside ? (found ? 1.0 : 0.5) : 0.0, r.value_range.x, r.value_range.y);
+  probes[i].lower = ivec4(r.lower, r.level);
+  probes[i].upper = ivec4(r.upper, r.width);
+}
+)";
+
+template <class T>
+GlBuffer upload(Context& gl, const std::vector<T>& data) {
+  GlBuffer buffer = make_buffer(gl);
+  gl.gl().NamedBufferStorage(buffer.id(), static_cast<GLsizeiptr>(data.size() * sizeof(T)), data.data(), 0);
+  return buffer;
+}
+
+std::vector<RegionProbe> probe_regions(Context& gl, const AmrHierarchy& h, const EncodedField& field,
+                                       std::span<const FinestPosition> positions) {
+  ShaderFiles files{{"region_probe.comp", kRegionProbe}};
+  for (const ShaderFile& f : shader_files()) files.emplace(f.path, f.text);
+  ShaderKey key;
+  key.entry = "region_probe.comp";
+  key.use(field.shader).define("AMRTEX_RAY_DOUBLE", 0);
+  Program program(gl, assemble_shader(key, files));
+  std::vector<glm::ivec4> cells;
+  std::vector<glm::vec4> fractions;
+  for (const FinestPosition& p : positions) {
+    cells.emplace_back(p.cell, 0);
+    fractions.emplace_back(Vec3f(p.fraction), 0);
+  }
+  std::vector<RegionProbe> probes(positions.size());
+  const GlBuffer cell_buffer = upload(gl, cells);
+  const GlBuffer fraction_buffer = upload(gl, fractions);
+  const GlBuffer probe_buffer = upload(gl, probes);
+  const GpuField gpu(field, gl);
+  program.use();
+  for (const UniformValue& u : field_uniforms(h, field)) program.set_optional(u);
+  program.set("u_count", static_cast<int>(positions.size()));
+  program.bind_buffer("cells_block", cell_buffer.id());
+  program.bind_buffer("fractions_block", fraction_buffer.id());
+  program.bind_buffer("probes_block", probe_buffer.id());
+  gpu.bind(program);
+  gl.gl().DispatchCompute(static_cast<GLuint>((positions.size() + 63) / 64), 1, 1);
+  gl.gl().MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  gl.gl().GetNamedBufferSubData(probe_buffer.id(), 0, static_cast<GLsizeiptr>(probes.size() * sizeof(RegionProbe)),
+                                probes.data());
+  gl.check("probing regions");
+  return probes;
+}
+
+TEST(Conformance, RegionsHoldTheirPositionsAndTheirValues) {
+  Context& gl = context(ContextKind::egl);
+  for_each_case({nested_2, holes_3}, [&](const AmrHierarchy& h, const EncodingCase& c) {
+    const auto positions = probe_positions(h, 60);
+    for (const Storage storage : {Storage::r32f, Storage::r8})
+      for (const Filtering filtering : c.filterings()) {
+        SCOPED_TRACE(fmt::format("{} {}", format_name(storage), filtering_name(filtering)));
+        const EncodedField field = build(h, c, {.storage = storage, .filtering = filtering});
+        const auto probes = probe_regions(gl, h, field, positions);
+        int bad_boxes = 0, skippable = 0;
+        for (std::size_t i = 0; i < positions.size(); ++i) {
+          const RegionProbe& p = probes[i];
+          if (p.value.y == 0) continue;  // outside the mesh
+          const Box box{Vec3i(p.lower), Vec3i(p.upper)};
+          const Vec3i last = h.cells(h.finest_level());
+          bool good = box.contains(positions[i].cell) && p.upper.w == h.cell_width(p.lower.w);
+          for (int a = 0; a < 3; ++a)
+            good = good && box.lower[a] % p.upper.w == 0 && (box.upper[a] % p.upper.w == 0 || box.upper[a] == last[a]);
+          bad_boxes += good ? 0 : 1;
+          if (p.value.y < 1) continue;
+          const bool in_range = p.value.x >= p.value.z && p.value.x <= p.value.w;
+          EXPECT_TRUE(in_range) << fmt::format("{} is not in [{}, {}]", p.value.x, p.value.z, p.value.w);
+          skippable += p.value.w - p.value.z < 0.9 * value_range(h) ? 1 : 0;
+        }
+        EXPECT_EQ(bad_boxes, 0);
+        if (h.leaf_cells() > 5000) {
+          EXPECT_GT(skippable, 0) << "ranges that hold everything skip nothing";
+        }
+      }
+  });
+}
+
+// ---- no value: nothing spreads further than the filter's footprint ----
+
+TEST(Conformance, MissingValuesSpreadNoFurtherThanTheFootprint) {
+  // one cell holds 1e6, or NaN in its stead: what is two cells off does not change by a bit
+  const Vec3i odd(8, 5, 7);
+  const auto with = [&](double value) {
+    return MeshBuilder(Vec3i(14)).root([&](const Vec3d& p) { return Vec3i(p * 14.0) == odd ? value : waves(p); }).hierarchy();
+  };
+  const AmrHierarchy missing = with(kNan);
+  const AmrHierarchy present = with(0.25);
+  std::vector<FinestPosition> far;
+  std::vector<FinestPosition> within;
+  for (const FinestPosition& p : probe_positions(missing, 1500)) {
+    const Vec3i d = glm::abs(p.cell - odd);
+    const int distance = std::max({d.x, d.y, d.z});
+    if (distance >= 2) far.push_back(p);
+    if (distance == 0) within.push_back(p);
+  }
+  ASSERT_GT(far.size(), 1000u);
+  ASSERT_GT(within.size(), 5u);
+  for (const EncodingCase& c : encoding_cases()) {
+    SCOPED_TRACE(c.name());
+    const EncodedField a = build(missing, c);
+    const EncodedField b = build(present, c);
+    const Comparison same = compare(far, values_of(probe_on_cpu(present, b, Precision::single_precision, far)),
+                                    probe_on_cpu(missing, a, Precision::single_precision, far), 0.0);
+    EXPECT_TRUE(same) << same;
+    for (const ProbeResult& r : probe_on_cpu(missing, a, Precision::single_precision, within)) EXPECT_FALSE(r.found);
+    for (const Filtering filtering : c.filterings()) {
+      const EncodedField field = build(missing, c, {.filtering = filtering});
+      Context& gl = context(ContextKind::egl);
+      for (const ProbeResult& r : probe_on_gl(gl, missing, field, GpuField(field, gl), far))
+        EXPECT_TRUE(r.found && std::isfinite(r.value));
+      for (const ProbeResult& r : probe_on_gl(gl, missing, field, GpuField(field, gl), within)) EXPECT_FALSE(r.found);
+    }
+  }
+}
+
+// ---- controls: a check that cannot fail is a defect ----
+
+/// The same check over data that was tampered with; a fetch outside of a texture is noticed too.
+bool noticed(const AmrHierarchy& h, const EncodedField& field, std::span<const FinestPosition> positions) {
+  try {
+    return !compare_double(h, field, positions);
+  } catch (const Error&) {
+    return true;
+  }
+}
+
+template <class F>
+void for_each_value_texture(EncodedField& field, F&& f) {
+  for (HostTexture& t : field.textures)
+    if (t.holds_values) f(t);
+}
+
+TEST(MutationControl, SwappedAxesAreNoticed) {
+  for (const std::size_t mesh : {single, nested_2, holes}) {
+    const AmrHierarchy& h = meshes()[mesh].hierarchy;
+    const auto positions = probe_positions(h, 60);
+    for (const EncodingCase& c : encoding_cases()) {
+      SCOPED_TRACE(meshes()[mesh].name + ": " + c.name());
+      EncodedField field = build(h, c, {.storage = Storage::r64f});
+      ASSERT_FALSE(noticed(h, field, positions)) << "the control needs a field that passes";
+      for_each_value_texture(field, [](HostTexture& t) {
+        const HostTexture before = t;
+        std::swap(t.size.x, t.size.y);
+        for_each_cell({Vec3i(0), before.size}, [&](const Vec3i& i) {
+          t.as<double>()[Box{Vec3i(0), t.size}.offset({i.y, i.x, i.z})] =
+              before.as<double>()[Box{Vec3i(0), before.size}.offset(i)];
+        });
+      });
+      EXPECT_TRUE(noticed(h, field, positions));
+    }
+  }
+}
+
+TEST(MutationControl, ValuesShiftedByOneTexelAreNoticed) {
+  const AmrHierarchy& h = meshes()[nested_2].hierarchy;
+  const auto positions = probe_positions(h, 60);
+  for (const EncodingCase& c : encoding_cases()) {
+    SCOPED_TRACE(c.name());
+    EncodedField field = build(h, c, {.storage = Storage::r64f});
+    for_each_value_texture(field, [](HostTexture& t) { std::rotate(t.data.begin(), t.data.begin() + 8, t.data.end()); });
+    EXPECT_TRUE(noticed(h, field, positions));
+  }
+}
+
+TEST(MutationControl, AWrongLevelsWidthIsNoticed) {
+  for (const std::size_t mesh : {nested_2, nested_4_2, nested_3_2, jump}) {
+    const AmrHierarchy& h = meshes()[mesh].hierarchy;
+    const auto positions = probe_positions(h, 60);
+    for (const EncodingCase& c : encoding_cases()) {
+      SCOPED_TRACE(meshes()[mesh].name + ": " + c.name());
+      const EncodedField field = build(h, c, {.storage = Storage::r64f});
+      const Values expected = reference_values(h, field.definition, positions);
+      const auto levels = probe_on_cpu(h, field, Precision::double_precision, positions);
+      const int used =
+          std::max_element(levels.begin(), levels.end(), [](const auto& a, const auto& b) { return a.level < b.level; })->level;
+      UniformValues uniforms = field_uniforms(h, field);
+      for (UniformValue& u : uniforms)
+        if (u.name == "u_level_width") std::get<std::vector<int>>(u.numbers)[static_cast<std::size_t>(used)] *= 2;
+      const auto cpu = make_cpu_field(field.encoding, Precision::double_precision);
+      std::vector<const HostTexture*> textures;
+      for (const HostTexture& t : field.textures) textures.push_back(&t);
+      cpu->set(field.shader.defines, uniforms, textures);
+      bool differs = false;
+      try {
+        std::vector<ProbeResult> results;
+        for (const FinestPosition& p : positions) results.push_back(cpu->sample(p.cell, p.fraction));
+        differs = !compare(positions, expected, results, 1e-12 * value_range(h));
+      } catch (const Error&) {
+        differs = true;
+      }
+      EXPECT_TRUE(differs);
+    }
+  }
+}
+
+TEST(MutationControl, SingleTexelsAreNoticedAsOftenAsTheyHoldACellsValue) {
+  const AmrHierarchy& h = meshes()[single].hierarchy;
+  std::vector<FinestPosition> positions;
+  for_each_cell(h.domain(0), [&](const Vec3i& c) {
+    positions.push_back({c, Vec3d(0.5)});
+    positions.push_back({c, Vec3d(0)});
+  });
+  for (const EncodingCase& c : encoding_cases()) {
+    SCOPED_TRACE(c.name());
+    const EncodedField field = build(h, c, {.storage = Storage::r64f});
+    constexpr int kTries = 40;
+    int caught = 0;
+    double share = 0;
+    std::mt19937_64 random(3);
+    for (int i = 0; i < kTries; ++i) {
+      EncodedField copy = field;
+      for_each_value_texture(copy, [&](HostTexture& t) {
+        share = static_cast<double>(t.roles.payload) / static_cast<double>(t.bytes());
+        t.as<double>()[std::uniform_int_distribution<std::int64_t>(0, t.texels() - 1)(random)] += 0.5;
+      });
+      caught += noticed(h, copy, positions) ? 1 : 0;
+    }
+    EXPECT_GE(caught, 0.6 * kTries * share) << "payload share " << share;
+  }
+}
+
+TEST(MutationControl, CorruptedTexturesReachTheGlContextToo) {
+  const AmrHierarchy& h = meshes()[nested_2].hierarchy;
+  const auto positions = probe_positions(h, 40);
+  Context& gl = context(ContextKind::egl);
+  for (const EncodingCase& c : encoding_cases())
+    for (const Filtering filtering : c.filterings()) {
+      SCOPED_TRACE(c.name());
+      EncodedField field = build(h, c, {.filtering = filtering});
+      const Values expected = reference_values(h, field.definition, positions);
+      for_each_value_texture(field, [](HostTexture& t) { std::rotate(t.data.begin(), t.data.begin() + 4, t.data.end()); });
+      EXPECT_FALSE(
+          compare(positions, expected, probe_on_gl(gl, h, field, GpuField(field, gl), positions), 1e-3 * value_range(h)));
+    }
+}
+
+}  // namespace
+}  // namespace amrtex
