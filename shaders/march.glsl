@@ -243,7 +243,7 @@ void march_lattice_rest(INOUT(Accumulation) a, IN(Ray) ray, IN(int) whole) {
   block.step = vec3r(0);
   Region r;
   bool inside = locate(p, r);
-  bool skipped = !inside || region_invisible(a, r) || !(length > real(0));
+  bool skipped = !inside || region_invisible(a, r);
   count_region(a, skipped);
   if (!skipped) take_sample(a, r, lattice_q(block, lattice_frame(block, r), r, real(0)), length);
 }
@@ -259,7 +259,7 @@ void march_lattice(IN(Ray) ray, INOUT(Accumulation) a) {
       first += AMRTEX_BLOCK;
     } while (first < whole && !ray_ended(a));
   }
-  if (!ray_ended(a)) march_lattice_rest(a, ray, whole);
+  if (ray_real(u_step) * ray_real(whole) < ray.length && !ray_ended(a)) march_lattice_rest(a, ray, whole);
 }
 
 // ---- adaptive: each region is divided into equal intervals of at most `step` of its own cells.

@@ -14,10 +14,11 @@ void main() {
   Accumulation a = empty_accumulation();
   Ray ray;
   vec4 color = vec4(0);
-  if (camera_ray(gl_FragCoord.xy, ray)) color = march_ray(ray, a);
+  bool met = camera_ray(gl_FragCoord.xy, ray);
+  if (met) color = march_ray(ray, a);
   else if (AMRTEX_MODE != AMRTEX_MODE_DVR) color.w = 1.0;
   out_color = color;
 #if AMRTEX_COUNT
-  out_counted = uvec4(uvec3(a.counted), color == vec4(0) && a.counted.y == 0 ? 0u : 1u);
+  out_counted = uvec4(uvec3(a.counted), met ? 1u : 0u);
 #endif
 }

@@ -32,6 +32,8 @@ double storage_slack(Storage storage, StorageScale scale, double largest) {
 
 double range_origin(const FieldStatistics& s, Storage storage, StorageScale scale) {
   if (std::isnan(s.min)) return 0;
+  // interpolants of values from 0 up stay there: regions of 0 then have the range (0, 0), which projections skip
+  if (s.min == 0 && (storage == Storage::r32f || storage == Storage::r64f)) return 0;
   const double lowest = s.min - storage_slack(storage, scale, std::max(std::abs(s.min), std::abs(s.max)));
   return static_cast<double>(std::nextafter(static_cast<float>(lowest), -std::numeric_limits<float>::infinity()));
 }

@@ -22,10 +22,12 @@ struct Plan {
   Vec3i blocks;
   bool validity;
   bool ranges;
+  int border;  ///< texels round the domain: the fills of cells outside, which clamping gives only where no cell is missing
+  Box texels() const { return Box{Vec3i(0), cells}.grown(border); }
   std::int64_t cell_count() const { return std::int64_t{cells.x} * cells.y * cells.z; }
   std::int64_t block_count() const { return std::int64_t{blocks.x} * blocks.y * blocks.z; }
   std::int64_t bytes(Storage storage) const {
-    return cell_count() * texel_bytes(storage) + (validity ? 4 * words_for_bits(cell_count()) : 0) + (ranges ? 4 * block_count() : 0);
+    return texels().cells() * texel_bytes(storage) + (validity ? 4 * words_for_bits(cell_count()) : 0) + (ranges ? 4 * block_count() : 0);
   }
 };
 
@@ -61,10 +63,11 @@ Plan Uniform::plan(const AmrHierarchy& h, const BuildRequest& request, const Jso
   p.blocks = ceil_div(p.cells, kBlock);
   p.validity = h.has_missing(request.field);
   p.ranges = request.needs.value_ranges;
+  p.border = p.validity && request.needs.filter != Filter::nearest ? 1 : 0;
   const std::int64_t bytes = p.bytes(request.storage);
   require_budget(*this, bytes, request);
   const int limit = request.context.max_3d_texture_size;
-  if (std::max({p.cells.x, p.cells.y, p.cells.z}) > limit)
+  if (std::max({p.cells.x, p.cells.y, p.cells.z}) + 2 * p.border > limit)
     throw UnsupportedError(fmt::format("encoding uniform: level {} has {} x {} x {} cells ({} bytes), a 3D texture of this context at most {} along an axis",
                                        p.level, p.cells.x, p.cells.y, p.cells.z, bytes, limit));
   if (p.validity && 4 * words_for_bits(p.cell_count()) > request.context.max_buffer_bytes)
@@ -99,10 +102,17 @@ struct Writer {
       if (!missing_cells.empty()) missing_cells[all.offset(c)] = none ? 1 : 0;
     });
     for (double value : v) range.add(value);
-    for (int z = inner.lower.z; z < inner.upper.z; ++z)
-      for (int y = inner.lower.y; y < inner.upper.y; ++y)
-        store_values(request.storage, scale, &v[box.offset({inner.lower.x, y, z})], static_cast<std::size_t>(inner.size().x), values.data.data(),
-                     all.offset({inner.lower.x, y, z}));
+    // a block at the domain's boundary writes the border there
+    const Box texels = plan.texels();
+    Box own = inner;
+    for (int a = 0; a < 3; ++a) {
+      if (own.lower[a] == all.lower[a]) own.lower[a] = texels.lower[a];
+      if (own.upper[a] == all.upper[a]) own.upper[a] = texels.upper[a];
+    }
+    for (int z = own.lower.z; z < own.upper.z; ++z)
+      for (int y = own.lower.y; y < own.upper.y; ++y)
+        store_values(request.storage, scale, &v[box.offset({own.lower.x, y, z})], static_cast<std::size_t>(own.size().x), values.data.data(),
+                     texels.offset({own.lower.x, y, z}));
     if (ranges != nullptr)
       ranges->as<std::uint32_t>()[Box{Vec3i(0), plan.blocks}.offset(b)] = encode_range(any ? range : ValueRange{}, range_origin, request.storage, scale);
   }
@@ -116,12 +126,14 @@ EncodedField Uniform::build(const AmrHierarchy& h, const BuildRequest& request) 
   field.build_parameters["level"] = p.level;
   field.definition.page_level = p.level;
   field.shader.defines.emplace_back("AMRTEX_DENSE_LEVEL", p.level);
+  field.shader.defines.emplace_back("AMRTEX_DENSE_BORDER", p.border);
   field.integer_uniforms = {{"u_dense_cells", p.cells}, {"u_dense_blocks", p.blocks}};
 
-  HostTexture values = make_texture("tex_dense", request.storage, p.cells);
+  HostTexture values = make_texture("tex_dense", request.storage, p.texels().size());
   values.hardware_linear = field.filtering == Filtering::hardware;
   values.holds_values = true;
-  values.roles.payload = values.bytes();
+  values.roles.payload = p.cell_count() * texel_bytes(request.storage);
+  values.roles.duplicated = values.bytes() - values.roles.payload;
   HostTexture validity = p.validity ? make_buffer("dense_validity", TexelFormat::r32ui, words_for_bits(p.cell_count())) : HostTexture{};
   HostTexture ranges = p.ranges ? make_buffer("dense_ranges", TexelFormat::r32ui, p.block_count()) : HostTexture{};
 

@@ -4,8 +4,12 @@
 #ifndef AMRTEX_DENSE_LEVEL
 #error AMRTEX_DENSE_LEVEL must be defined: the level that the texture holds
 #endif
+#ifndef AMRTEX_DENSE_BORDER
+#error AMRTEX_DENSE_BORDER must be defined: 1 where the texture holds the cells round the domain, else 0
+#endif
 #endif
 DEFINE_INT(AMRTEX_DENSE_LEVEL)
+DEFINE_INT(AMRTEX_DENSE_BORDER)
 
 VALUE_TEXTURE(tex_dense)
 UNIFORM(ivec3, u_dense_cells)   // cells of the level
@@ -25,8 +29,8 @@ bool locate(IN(Position) p, OUT(Region) r) {
   r.value_range = vec2r(0);
   r.handle = ivec4(0);
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
-  r.texture_scale = vec3r(1) / vec3r(u_dense_cells);
-  r.texture_lower = vec3r(0);
+  r.texture_scale = vec3r(1) / vec3r(u_dense_cells + ivec3(2 * AMRTEX_DENSE_BORDER));
+  r.texture_lower = vec3r(AMRTEX_DENSE_BORDER) * r.texture_scale;
 #endif
 #if AMRTEX_CPP || AMRTEX_VALUE_RANGES
   if (AMRTEX_VALUE_RANGES != 0) {
@@ -37,7 +41,7 @@ bool locate(IN(Position) p, OUT(Region) r) {
     ivec3 first = block * AMRTEX_DENSE_BLOCK;
     r.handle = ivec4(first.x, first.y, first.z, 0);
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
-    r.texture_lower = vec3r(first) * r.texture_scale;
+    r.texture_lower = vec3r(first + ivec3(AMRTEX_DENSE_BORDER)) * r.texture_scale;
 #endif
     uint code = dense_ranges[block.x + u_dense_blocks.x * (block.y + u_dense_blocks.y * block.z)];
     r.value_range = decode_range(code);
@@ -47,7 +51,10 @@ bool locate(IN(Position) p, OUT(Region) r) {
   return true;
 }
 
-real dense_texel(IN(ivec3) cell) { return texelFetch(tex_dense, clamp(cell, ivec3(0), u_dense_cells - ivec3(1)), 0).x; }
+real dense_texel(IN(ivec3) cell) {
+  ivec3 last = u_dense_cells + ivec3(2 * AMRTEX_DENSE_BORDER - 1);
+  return texelFetch(tex_dense, clamp(cell + ivec3(AMRTEX_DENSE_BORDER), ivec3(0), last), 0).x;
+}
 
 #if AMRTEX_CPP || AMRTEX_VALIDITY
 bool dense_has_value(IN(ivec3) cell) {
