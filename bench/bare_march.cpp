@@ -58,7 +58,8 @@ class BareMarch {
   void filter(GLuint id) {
     context_.gl().TextureParameteri(id, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
     context_.gl().TextureParameteri(id, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-    for (GLenum axis : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, GL_TEXTURE_WRAP_R}) context_.gl().TextureParameteri(id, axis, GL_CLAMP_TO_EDGE);
+    for (GLenum axis : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, GL_TEXTURE_WRAP_R})
+      context_.gl().TextureParameteri(id, axis, GL_CLAMP_TO_EDGE);
   }
 
   void upload_dense(const HostTexture& host) {
@@ -66,8 +67,8 @@ class BareMarch {
     context_.gl().TextureStorage3D(dense_.id(), 1, GL_R32F, host.size.x, host.size.y, host.size.z);
     const int slab = host.size.z / 4 + 1;
     for (int z = 0; z < host.size.z; z += slab)
-      context_.gl().TextureSubImage3D(dense_.id(), 0, 0, 0, z, host.size.x, host.size.y, std::min(slab, host.size.z - z), GL_RED, GL_FLOAT,
-                                      host.as<float>() + Box{Vec3i(0), host.size}.offset({0, 0, z}));
+      context_.gl().TextureSubImage3D(dense_.id(), 0, 0, 0, z, host.size.x, host.size.y, std::min(slab, host.size.z - z), GL_RED,
+                                      GL_FLOAT, host.as<float>() + Box{Vec3i(0), host.size}.offset({0, 0, z}));
     filter(dense_.id());
   }
 

@@ -29,6 +29,7 @@ std::vector<Table> tables_of(const fs::path& folder, const std::string& columns)
   const std::vector<Json> records = load_records(folder);
   if (records.empty()) throw Error(fmt::format("{}: no records; accepted: a folder that `amrtex run` wrote", folder.string()));
   ReportOptions options;
+  if (columns.empty() && fs::exists(folder / "columns.json")) return tables_of(folder, (folder / "columns.json").string());
   if (!columns.empty())
     for (const Json& r : records) options.columns[r.at("experiment")] = read_columns(columns);
   return make_tables(records, options);
@@ -57,6 +58,9 @@ int run(const Arguments& a) {
   if (!a.memory_limit.empty()) options.memory_limit = parse_bytes(a.memory_limit);
   if (isatty(STDERR_FILENO) != 0) options.progress = [](const std::string& text) { fmt::print(stderr, "{}\n", text); };
   const RunSummary s = run_experiment(experiment, options);
+  // the experiment's own choice of columns goes along with its records
+  const fs::path columns = experiment.file.parent_path() / "columns.json";
+  if (fs::exists(columns)) fs::copy_file(columns, fs::path(a.output) / "columns.json", fs::copy_options::overwrite_existing);
   const std::vector<Table> tables = tables_of(a.output, "");
   write_tables(a.output, tables);
   if (a.json) {

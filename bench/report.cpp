@@ -178,6 +178,11 @@ constexpr ColumnRule kColumns[] = {
     {"wall", "frame wall (ms)", "", Role::measure, true, timing<"/frame/wall_ms">},
     {"gpu", "frame GPU (ms)", "", Role::measure, true, timing<"/frame/gpu_ms">},
     {"relative", "time / uniform", "", Role::measure, true, relative_cell},
+    {"baseline", "time / baseline", "", Role::measure, true, value<"/frame/relative">},
+    {"pages", "pages", "", Role::measure, true, value<"/statistics/pages">},
+    {"border_overhead", "border overhead", "", Role::measure, true, value<"/statistics/border_overhead">},
+    {"border_formula", "by formula", "", Role::measure, true, value<"/statistics/border_overhead_formula">},
+    {"oversampling", "oversampling", "", Role::measure, true, value<"/statistics/oversampling">},
     {"rays", "rays", "", Role::measure, true, value<"/work/rays">},
     {"samples", "samples", "", Role::measure, true, value<"/work/samples">},
     {"regions", "regions", "", Role::measure, true, value<"/work/regions">},
@@ -193,7 +198,9 @@ constexpr ColumnRule kColumns[] = {
 
 /// Measures that a table has unless others are chosen.
 bool is_default(const ColumnRule& rule) {
-  constexpr std::array<std::string_view, 6> on_demand = {"upload", "rays", "regions_skipped", "max_error", "mrse", "rmse_common"};
+  constexpr std::array<std::string_view, 11> on_demand = {"baseline",        "upload",         "rays",        "regions_skipped",
+                                                          "max_error",       "mrse",           "rmse_common", "pages",
+                                                          "border_overhead", "border_formula", "oversampling"};
   return std::find(on_demand.begin(), on_demand.end(), rule.key) == on_demand.end();
 }
 

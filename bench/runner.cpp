@@ -56,9 +56,7 @@ Failure failure_of(const std::exception& error) {
 class Runner {
  public:
   Runner(const Experiment& experiment, const RunOptions& options)
-      : experiment_(experiment),
-        options_(options),
-        context_(make_context(parse_context_kind(experiment.context))) {}
+      : experiment_(experiment), options_(options), context_(make_context(parse_context_kind(experiment.context))) {}
 
   RunSummary run() {
     for (const BuildPoint* build : measuring_order()) run_build(*build);

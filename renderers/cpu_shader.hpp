@@ -45,7 +45,8 @@ class CpuShader final : public CpuField {
 
   void set_uniform(const UniformValue& u) {
     if (const auto* ints = std::get_if<std::vector<int>>(&u.numbers)) {
-      if (auto it = shader_.bindings.ints.find(u.name); it != shader_.bindings.ints.end()) std::copy(ints->begin(), ints->end(), it->second);
+      if (auto it = shader_.bindings.ints.find(u.name); it != shader_.bindings.ints.end())
+        std::copy(ints->begin(), ints->end(), it->second);
       return;
     }
     const auto& reals = std::get<std::vector<double>>(u.numbers);

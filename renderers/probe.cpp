@@ -14,8 +14,8 @@ GlBuffer upload(Context& context, const std::vector<T>& values) {
 
 }  // namespace
 
-std::vector<ProbeResult> probe_on_gl(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const GpuField& gpu,
-                                     std::span<const FinestPosition> points) {
+std::vector<ProbeResult> probe_on_gl(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field,
+                                     const GpuField& gpu, std::span<const FinestPosition> points) {
   if (points.empty()) return {};
   std::vector<glm::ivec4> cells;
   std::vector<glm::vec4> fractions;
@@ -40,7 +40,8 @@ std::vector<ProbeResult> probe_on_gl(Context& context, const AmrHierarchy& hiera
   gpu.bind(program);
   context.gl().DispatchCompute(static_cast<GLuint>((points.size() + 63) / 64), 1, 1);
   context.gl().MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  context.gl().GetNamedBufferSubData(value_buffer.id(), 0, static_cast<GLsizeiptr>(values.size() * sizeof(glm::vec4)), values.data());
+  context.gl().GetNamedBufferSubData(value_buffer.id(), 0, static_cast<GLsizeiptr>(values.size() * sizeof(glm::vec4)),
+                                     values.data());
   context.check("probing the field");
   std::vector<ProbeResult> results;
   for (const glm::vec4& v : values) results.push_back({v.y > 0.5F, static_cast<double>(v.x), static_cast<int>(v.z)});

@@ -11,8 +11,8 @@
 namespace amrtex {
 
 /// The shader's positions: the fraction as float, so that GL and CPU see the same point.
-std::vector<ProbeResult> probe_on_gl(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const GpuField& gpu,
-                                     std::span<const FinestPosition> points);
+std::vector<ProbeResult> probe_on_gl(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field,
+                                     const GpuField& gpu, std::span<const FinestPosition> points);
 std::vector<ProbeResult> probe_on_cpu(const AmrHierarchy& hierarchy, const EncodedField& field, Precision precision,
                                       std::span<const FinestPosition> points);
 

@@ -27,7 +27,8 @@ ShaderKey shader_key(const EncodedField& field, const SceneBindings& bindings, b
 
 }  // namespace
 
-Raycaster::Raycaster(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const GpuField& gpu, const Scene& scene)
+Raycaster::Raycaster(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const GpuField& gpu,
+                     const Scene& scene)
     : context_(&context),
       field_(&field),
       gpu_(&gpu),

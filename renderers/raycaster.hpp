@@ -12,7 +12,7 @@ namespace amrtex {
 
 /// What the shader itself counted.
 struct WorkCounts {
-  std::int64_t rays = 0;             ///< that met the mesh's domain
+  std::int64_t rays = 0;  ///< that met the mesh's domain
   std::int64_t samples = 0;
   std::int64_t regions = 0;
   std::int64_t regions_skipped = 0;

@@ -13,12 +13,12 @@ namespace amrtex {
 
 /// A camera. The picture's first row is its top.
 struct View {
-  Vec3d eye{0, 0, 3};   ///< world
-  Vec3d at{0};          ///< world
-  Vec3d up{0, 0, 1};    ///< any length, not parallel to at - eye
-  double fov_y = 35;    ///< vertical field of view, degrees; perspective only
+  Vec3d eye{0, 0, 3};  ///< world
+  Vec3d at{0};         ///< world
+  Vec3d up{0, 0, 1};   ///< any length, not parallel to at - eye
+  double fov_y = 35;   ///< vertical field of view, degrees; perspective only
   bool orthographic = false;
-  double height = 1;    ///< world height of the picture; orthographic only
+  double height = 1;  ///< world height of the picture; orthographic only
 };
 
 /// A view resolved for a picture size. The ray of pixel (x, y), y from the top, with
@@ -55,9 +55,9 @@ struct TransferFunction {
   };
   enum class LengthUnit { longest_edge, world };
 
-  std::vector<ExtinctionPoint> extinction;  ///< ascending values
-  std::vector<ColorPoint> color;            ///< ascending values
-  bool logarithmic = false;                 ///< points are joined over log10(value); values <= 0 take the first point's
+  std::vector<ExtinctionPoint> extinction;            ///< ascending values
+  std::vector<ColorPoint> color;                      ///< ascending values
+  bool logarithmic = false;                           ///< points are joined over log10(value); values <= 0 take the first point's
   LengthUnit length_unit = LengthUnit::longest_edge;  ///< of 1 / extinction: the domain's longest edge, or the file's world unit
 
   double axis(double value) const;  ///< value, or log10 of it
@@ -80,10 +80,10 @@ Sampling parse_sampling(std::string_view name);  ///< UsageError names the accep
 struct RenderSettings {
   Mode mode = Mode::dvr;
   Sampling sampling = Sampling::adaptive;
-  double step = 1;      ///< cell widths (smallest edge): of the finest level for lattice, of the region for adaptive
-  int width = 512;      ///< pixels
-  int height = 512;     ///< pixels
-  bool skip = true;     ///< regions that the transfer function makes invisible are skipped
+  double step = 1;                  ///< cell widths (smallest edge): of the finest level for lattice, of the region for adaptive
+  int width = 512;                  ///< pixels
+  int height = 512;                 ///< pixels
+  bool skip = true;                 ///< regions that the transfer function makes invisible are skipped
   std::optional<double> early_end;  ///< opacity at which a ray ends; off when absent
 };
 

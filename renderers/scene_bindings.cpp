@@ -41,7 +41,8 @@ void add_points(const TransferFunction& tf, double unit, UniformValues& uniforms
       slope = (std::min(tf.extinction[i + 1].extinction * unit, 1e30) - kappa) / (tf.axis(tf.extinction[i + 1].value) - x);
     extinction.insert(extinction.end(), {x, kappa, slope});
   }
-  std::vector<double> color{tf.axis(tf.color.front().value), 0, tf.color.front().rgb.x, tf.color.front().rgb.y, tf.color.front().rgb.z};
+  std::vector<double> color{tf.axis(tf.color.front().value), 0, tf.color.front().rgb.x, tf.color.front().rgb.y,
+                            tf.color.front().rgb.z};
   for (std::size_t i = 1; i < tf.color.size(); ++i) {
     const double x = tf.axis(tf.color[i].value);
     const Vec3d step = tf.color[i].rgb - tf.color[i - 1].rgb;
@@ -156,7 +157,8 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
       add_table(tf, per_unit, b);
     }
     const double span = tf.axis(tf.extinction.back().value) - tf.axis(tf.extinction.front().value);
-    const double margin = b.transfer_exact ? 1e-6 * (span + std::abs(tf.axis(tf.extinction.front().value))) : 1.01 * span / kTableBins;
+    const double margin =
+        b.transfer_exact ? 1e-6 * (span + std::abs(tf.axis(tf.extinction.front().value))) : 1.01 * span / kTableBins;
     const std::vector<double> invisible = invisible_ranges(tf, margin);
     invisible_count = static_cast<int>(invisible.size() / 2);
     if (invisible_count > 0) b.uniforms.push_back({"u_invisible_ranges", invisible});

@@ -145,10 +145,12 @@ void AmrHierarchy::Data::check_levels() {
                          mesh.domain_lower[axis], mesh.domain_upper[axis]));
   std::int64_t finest = std::max({mesh.root_cells.x, mesh.root_cells.y, mesh.root_cells.z});
   for (std::size_t l = 0; l < mesh.ratios.size(); ++l) {
-    if (mesh.ratios[l] < 2) refuse(fmt::format("the refinement ratio from level {} to {} is {}; at least 2 is needed", l, l + 1, mesh.ratios[l]));
+    if (mesh.ratios[l] < 2)
+      refuse(fmt::format("the refinement ratio from level {} to {} is {}; at least 2 is needed", l, l + 1, mesh.ratios[l]));
     finest *= mesh.ratios[l];
     if (finest > kMaxIndex)
-      refuse(fmt::format("level {} has {} cells along an axis; at most {} (31 bits of index) are supported", l + 1, finest, kMaxIndex));
+      refuse(fmt::format("level {} has {} cells along an axis; at most {} (31 bits of index) are supported", l + 1, finest,
+                         kMaxIndex));
   }
   cells.assign(mesh.levels.size(), mesh.root_cells);
   width.assign(mesh.levels.size(), 1);
@@ -172,8 +174,8 @@ void AmrHierarchy::Data::check_patches(int level) const {
     if (level > 0) {
       const int r = mesh.ratios[static_cast<std::size_t>(level - 1)];
       if (box.coarsened(r).refined(r) != box)
-        refuse(fmt::format("level {}, patch {}: the box {} does not align with the cells of level {} (refinement ratio {})", level, k,
-                           text(box), level - 1, r));
+        refuse(fmt::format("level {}, patch {}: the box {} does not align with the cells of level {} (refinement ratio {})",
+                           level, k, text(box), level - 1, r));
     }
   }
   for (std::size_t k = 0; k < list.size(); ++k)
@@ -208,7 +210,8 @@ void AmrHierarchy::Data::mark_leaves(int level) {
         const bool aligned = covered.refined(r) == fine;
         for_each_cell(intersection(covered, box), [&](const Vec3i& cell) {
           if (!aligned && !fine.contains(Box{cell, cell + Vec3i(1)}.refined(r)) && !fully_refined(level, cell))
-            refuse(fmt::format("level {}, patch {}: cell {} is refined only in part, by level {}, patch {}", level, k, text(cell), finer, other));
+            refuse(fmt::format("level {}, patch {}: cell {} is refined only in part, by level {}, patch {}", level, k, text(cell),
+                               finer, other));
           masks[k][box.offset(cell)] = 0;
         });
       }

@@ -23,11 +23,11 @@ struct Patch {
 
 /// What a reader or generator hands over. Level 0 is the coarsest.
 struct MeshDescription {
-  std::string name;                        ///< of the data set, for tables
-  Vec3d domain_lower{0};                   ///< world
-  Vec3d domain_upper{1};                   ///< world
-  Vec3i root_cells{1};                     ///< cells of the domain at level 0
-  std::vector<int> ratios;                 ///< ratios[l] = cells of level l+1 a cell of level l along an axis; levels - 1 of them, each >= 2
+  std::string name;         ///< of the data set, for tables
+  Vec3d domain_lower{0};    ///< world
+  Vec3d domain_upper{1};    ///< world
+  Vec3i root_cells{1};      ///< cells of the domain at level 0
+  std::vector<int> ratios;  ///< ratios[l] = cells of level l+1 a cell of level l along an axis; levels - 1 of them, each >= 2
   std::vector<std::string> fields;         ///< names of the arrays in each patch
   std::vector<std::vector<Patch>> levels;  ///< patches a level; a level may be empty
   std::array<bool, 3> periodic{false, false, false};
@@ -36,15 +36,15 @@ struct MeshDescription {
 /// The leaf cell that holds a position.
 struct LeafCell {
   int level;
-  int patch;       ///< in patches(level)
-  Vec3i cell;      ///< level space
+  int patch;   ///< in patches(level)
+  Vec3i cell;  ///< level space
 };
 
 /// Over the leaf cells that have a value.
 struct FieldStatistics {
   double min = std::numeric_limits<double>::quiet_NaN();
   double max = std::numeric_limits<double>::quiet_NaN();
-  double volume_integral = 0;         ///< sum of value times cell volume, world units
+  double volume_integral = 0;            ///< sum of value times cell volume, world units
   std::int64_t cells_without_value = 0;  ///< leaf cells that hold NaN or an infinity
 };
 
@@ -74,8 +74,8 @@ class AmrHierarchy {
   /// Cells of the domain at `level`.
   Vec3i cells(int level) const;
   Box domain(int level) const { return {Vec3i(0), cells(level)}; }
-  Vec3d domain_lower() const;  ///< world
-  Vec3d domain_upper() const;  ///< world
+  Vec3d domain_lower() const;      ///< world
+  Vec3d domain_upper() const;      ///< world
   Vec3d spacing(int level) const;  ///< cell widths along the axes, world
   std::array<bool, 3> periodic() const;
 

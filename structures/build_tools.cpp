@@ -50,7 +50,8 @@ std::uint32_t encode_range(ValueRange range, double origin, Storage storage, Sto
   return below | (std::min(above, 0x7f80U) << 16);
 }
 
-void store_values(Storage storage, StorageScale scale, const double* values, std::size_t count, std::byte* data, std::size_t first) {
+void store_values(Storage storage, StorageScale scale, const double* values, std::size_t count, std::byte* data,
+                  std::size_t first) {
   if (storage == Storage::r32f) {
     auto* out = reinterpret_cast<float*>(data) + first;
     for (std::size_t i = 0; i < count; ++i) out[i] = std::isnan(values[i]) ? 0.0F : static_cast<float>(values[i]);
@@ -98,7 +99,8 @@ int common_ratio_shift(const AmrHierarchy& hierarchy) {
 
 }  // namespace
 
-EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request, const Json& parameters) {
+EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request,
+                         const Json& parameters) {
   EncodedField field;
   const bool linear = request.needs.filter != Filter::nearest;
   field.encoding = encoding.name();
@@ -131,7 +133,8 @@ int integer_parameter(const Encoding& encoding, const Json& parameters, std::str
   }
   for (const ParameterInfo& p : encoding.parameters())
     if (p.name == name)
-      throw UsageError(fmt::format("encoding {}: parameter {} is {}; accepted: {}", encoding.name(), name, value.dump(), p.accepted));
+      throw UsageError(
+          fmt::format("encoding {}: parameter {} is {}; accepted: {}", encoding.name(), name, value.dump(), p.accepted));
   throw UsageError(fmt::format("encoding {}: parameter {} is {}", encoding.name(), name, value.dump()));
 }
 

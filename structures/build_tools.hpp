@@ -31,7 +31,8 @@ double range_origin(const FieldStatistics& statistics, Storage storage, StorageS
 std::uint32_t encode_range(ValueRange range, double origin, Storage storage, StorageScale scale);
 
 /// Stores `count` values side by side from texel `first`; NaN is stored as 0.
-void store_values(Storage storage, StorageScale scale, const double* values, std::size_t count, std::byte* data, std::size_t first);
+void store_values(Storage storage, StorageScale scale, const double* values, std::size_t count, std::byte* data,
+                  std::size_t first);
 
 /// An allocated, zeroed texture or buffer.
 HostTexture make_texture(std::string name, TexelFormat format, const Vec3i& size);
@@ -45,7 +46,8 @@ inline void set_bit(std::uint32_t* words, std::int64_t bit) { words[bit / 32] |=
 bool power_of_two_ratios(const AmrHierarchy& hierarchy);
 
 /// Fields of EncodedField that are filled in the same way for every encoding.
-EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request, const Json& parameters);
+EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request,
+                         const Json& parameters);
 
 /// Reads an integer parameter. Throws UsageError naming what is accepted.
 int integer_parameter(const Encoding& encoding, const Json& parameters, std::string_view name);

@@ -9,7 +9,8 @@
 namespace amrtex {
 namespace {
 
-constexpr std::array<Filter, 5> kFilters{Filter::nearest, Filter::linear_lod, Filter::linear_page, Filter::linear_vertex, Filter::basis};
+constexpr std::array<Filter, 5> kFilters{Filter::nearest, Filter::linear_lod, Filter::linear_page, Filter::linear_vertex,
+                                         Filter::basis};
 
 template <class Range, class Name>
 std::string join_names(const Range& range, Name&& name) {
@@ -22,11 +23,16 @@ std::string join_names(const Range& range, Name&& name) {
 
 std::string_view filter_name(Filter filter) {
   switch (filter) {
-    case Filter::nearest: return "nearest";
-    case Filter::linear_lod: return "linear_lod";
-    case Filter::linear_page: return "linear_page";
-    case Filter::linear_vertex: return "linear_vertex";
-    case Filter::basis: return "basis";
+    case Filter::nearest:
+      return "nearest";
+    case Filter::linear_lod:
+      return "linear_lod";
+    case Filter::linear_page:
+      return "linear_page";
+    case Filter::linear_vertex:
+      return "linear_vertex";
+    case Filter::basis:
+      return "basis";
   }
   return "";
 }
@@ -119,9 +125,9 @@ void require_filter(const Encoding& encoding, Filter filter) {
 
 void require_budget(const Encoding& encoding, std::int64_t bytes, const BuildRequest& request) {
   if (bytes > request.memory_limit)
-    throw BudgetError(fmt::format("encoding {} with {}: needs {} bytes ({:.1f} MiB), the memory limit is {} bytes ({:.1f} MiB)", encoding.name(),
-                                  request.parameters.dump(), bytes, static_cast<double>(bytes) / 1048576.0, request.memory_limit,
-                                  static_cast<double>(request.memory_limit) / 1048576.0));
+    throw BudgetError(fmt::format("encoding {} with {}: needs {} bytes ({:.1f} MiB), the memory limit is {} bytes ({:.1f} MiB)",
+                                  encoding.name(), request.parameters.dump(), bytes, static_cast<double>(bytes) / 1048576.0,
+                                  request.memory_limit, static_cast<double>(request.memory_limit) / 1048576.0));
 }
 
 }  // namespace amrtex

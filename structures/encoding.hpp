@@ -25,7 +25,7 @@ std::span<const Filter> all_filters();
 /// Which field f(p) exactly: the filter and, for `linear_page`, its pages.
 struct FilterDefinition {
   Filter filter = Filter::nearest;
-  int page_size = 0;  ///< cells along an edge of a page; 0 = the whole domain is one page
+  int page_size = 0;   ///< cells along an edge of a page; 0 = the whole domain is one page
   int page_level = 0;  ///< level of that one page (page_size 0 only)
   bool operator==(const FilterDefinition&) const = default;
 };
@@ -38,7 +38,7 @@ Filtering parse_filtering(std::string_view name);
 /// What a GL context offers, as far as encodings care. The defaults are "no limit known".
 struct ContextInfo {
   std::string renderer, version, vendor;
-  int max_3d_texture_size = 2048;                     ///< texels along an axis
+  int max_3d_texture_size = 2048;                         ///< texels along an axis
   std::int64_t max_buffer_bytes = std::int64_t{1} << 27;  ///< of one shader storage block
   bool bindless_texture = false;
   std::vector<std::string> extensions;
@@ -66,31 +66,31 @@ struct ParameterInfo {
   std::string name;
   std::string description;  ///< with its unit
   Json default_value;
-  std::string accepted;     ///< for error messages: "an integer from 4 to 128"
+  std::string accepted;  ///< for error messages: "an integer from 4 to 128"
 };
 
 /// The shader's view of one built field: the file with its locate() and
 /// fetch_field(), and every define that the file requires.
 struct ShaderPart {
-  std::string file;                                        ///< as known to the shader library, "page_table/page_table.glsl"
-  std::vector<std::pair<std::string, int>> defines;        ///< name, value
+  std::string file;                                  ///< as known to the shader library, "page_table/page_table.glsl"
+  std::vector<std::pair<std::string, int>> defines;  ///< name, value
 };
 
 /// Built data: plain, independent of GL and of any consumer.
 struct EncodedField {
   std::string encoding;
-  Json build_parameters;                 ///< complete, with defaults filled in
-  FilterDefinition definition;           ///< the mathematics that this field reproduces
+  Json build_parameters;        ///< complete, with defaults filled in
+  FilterDefinition definition;  ///< the mathematics that this field reproduces
   Filtering filtering = Filtering::manual;
   Storage storage = Storage::r32f;
   StorageScale scale;
-  double range_origin = 0;               ///< what coded value ranges are relative to (build_tools.hpp)
+  double range_origin = 0;  ///< what coded value ranges are relative to (build_tools.hpp)
   ShaderPart shader;
   std::vector<HostTexture> textures;
   std::vector<std::pair<std::string, Vec3i>> integer_uniforms;  ///< ivec3 uniforms of the encoding's GLSL
   std::vector<LeftOut> left_out;
-  Json statistics;                       ///< counts of the structure: pages, nodes, fill, ...
-  std::int64_t host_peak_bytes = 0;      ///< arrays that the build itself allocated at once, the result included
+  Json statistics;                   ///< counts of the structure: pages, nodes, fill, ...
+  std::int64_t host_peak_bytes = 0;  ///< arrays that the build itself allocated at once, the result included
 
   MemoryByRole memory() const;
   /// Texels of the textures that hold values.
@@ -104,8 +104,8 @@ struct BuildRequest {
   int field = 0;
   Storage storage = Storage::r32f;
   SceneNeeds needs;
-  Json parameters = Json::object();   ///< unknown keys are an error
-  ContextInfo context;                ///< limits to keep
+  Json parameters = Json::object();                                      ///< unknown keys are an error
+  ContextInfo context;                                                   ///< limits to keep
   std::int64_t memory_limit = std::numeric_limits<std::int64_t>::max();  ///< bytes of all textures and buffers
 };
 

@@ -75,23 +75,41 @@ StorageScale storage_scale(Storage storage, double min, double max) {
 void store_value(Storage storage, StorageScale scale, double value, std::byte* data, std::size_t index) {
   const double code = (value - scale.offset) / scale.scale;
   switch (storage) {
-    case Storage::r8: put(data, index, static_cast<std::uint8_t>(std::lround(std::clamp(code, 0.0, 1.0) * 255))); break;
-    case Storage::r16: put(data, index, static_cast<std::uint16_t>(std::lround(std::clamp(code, 0.0, 1.0) * 65535))); break;
-    case Storage::r16f: put(data, index, glm::packHalf1x16(static_cast<float>(code))); break;
-    case Storage::r32f: put(data, index, static_cast<float>(value)); break;
-    case Storage::r64f: put(data, index, value); break;
-    default: assert(false);
+    case Storage::r8:
+      put(data, index, static_cast<std::uint8_t>(std::lround(std::clamp(code, 0.0, 1.0) * 255)));
+      break;
+    case Storage::r16:
+      put(data, index, static_cast<std::uint16_t>(std::lround(std::clamp(code, 0.0, 1.0) * 65535)));
+      break;
+    case Storage::r16f:
+      put(data, index, glm::packHalf1x16(static_cast<float>(code)));
+      break;
+    case Storage::r32f:
+      put(data, index, static_cast<float>(value));
+      break;
+    case Storage::r64f:
+      put(data, index, value);
+      break;
+    default:
+      assert(false);
   }
 }
 
 double load_value(Storage storage, StorageScale scale, const std::byte* data, std::size_t index) {
   switch (storage) {
-    case Storage::r8: return scale.offset + scale.scale * (get<std::uint8_t>(data, index) / 255.0);
-    case Storage::r16: return scale.offset + scale.scale * (get<std::uint16_t>(data, index) / 65535.0);
-    case Storage::r16f: return scale.offset + scale.scale * static_cast<double>(glm::unpackHalf1x16(get<std::uint16_t>(data, index)));
-    case Storage::r32f: return static_cast<double>(get<float>(data, index));
-    case Storage::r64f: return get<double>(data, index);
-    default: assert(false); return 0;
+    case Storage::r8:
+      return scale.offset + scale.scale * (get<std::uint8_t>(data, index) / 255.0);
+    case Storage::r16:
+      return scale.offset + scale.scale * (get<std::uint16_t>(data, index) / 65535.0);
+    case Storage::r16f:
+      return scale.offset + scale.scale * static_cast<double>(glm::unpackHalf1x16(get<std::uint16_t>(data, index)));
+    case Storage::r32f:
+      return static_cast<double>(get<float>(data, index));
+    case Storage::r64f:
+      return get<double>(data, index);
+    default:
+      assert(false);
+      return 0;
   }
 }
 

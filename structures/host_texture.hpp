@@ -41,14 +41,14 @@ struct MemoryByRole {
 /// A 3D texture, or a buffer that the shader reads as an array (std430).
 struct HostTexture {
   enum class Kind { texture_3d, buffer };
-  std::string name;                    ///< of the sampler or buffer in the encoding's GLSL
+  std::string name;  ///< of the sampler or buffer in the encoding's GLSL
   Kind kind = Kind::texture_3d;
   TexelFormat format = TexelFormat::r32f;
-  Vec3i size{0};                       ///< texels; a buffer has its elements in x (y = z = 1)
-  bool hardware_linear = false;        ///< filtered by the sampler rather than fetched texel by texel
-  bool holds_values = false;           ///< counts towards texels_per_cell
-  MemoryByRole roles;                  ///< sums to bytes()
-  std::vector<std::byte> data;         ///< x fastest
+  Vec3i size{0};                 ///< texels; a buffer has its elements in x (y = z = 1)
+  bool hardware_linear = false;  ///< filtered by the sampler rather than fetched texel by texel
+  bool holds_values = false;     ///< counts towards texels_per_cell
+  MemoryByRole roles;            ///< sums to bytes()
+  std::vector<std::byte> data;   ///< x fastest
 
   std::int64_t texels() const { return std::int64_t{size.x} * size.y * size.z; }
   std::int64_t bytes() const { return texels() * texel_bytes(format); }

@@ -8,7 +8,8 @@ namespace amrtex {
 namespace {
 
 /// Copies patch values of `level` or coarser over the part of the box that the patch covers.
-void copy_patch(const AmrHierarchy& h, int field, int level, const Box& box, int from, const Patch& patch, std::span<double> out) {
+void copy_patch(const AmrHierarchy& h, int field, int level, const Box& box, int from, const Patch& patch,
+                std::span<double> out) {
   const int r = h.cell_width(from) / h.cell_width(level);
   const auto& values = patch.values[static_cast<std::size_t>(field)];
   const Box part = intersection(patch.box.refined(r), box);
@@ -50,7 +51,8 @@ bool is_nested(const AmrHierarchy& h, int level, const Box& box) {
   // every cell of the box's domain part stored at this level: nothing to average
   std::int64_t stored = 0;
   const Box inside = intersection(box, h.domain(level));
-  for (int k : h.patches_in(level, inside)) stored += intersection(h.patches(level)[static_cast<std::size_t>(k)].box, inside).cells();
+  for (int k : h.patches_in(level, inside))
+    stored += intersection(h.patches(level)[static_cast<std::size_t>(k)].box, inside).cells();
   return stored == inside.cells();
 }
 
@@ -76,7 +78,8 @@ void level_values(const AmrHierarchy& h, int field, int level, const Box& box, s
   if (!is_nested(h, level, box)) first = 0;
   for (int from = first; from <= level; ++from) {
     const int r = h.cell_width(from) / h.cell_width(level);
-    for (int k : h.patches_in(from, box.coarsened(r))) copy_patch(h, field, level, box, from, h.patches(from)[static_cast<std::size_t>(k)], out);
+    for (int k : h.patches_in(from, box.coarsened(r)))
+      copy_patch(h, field, level, box, from, h.patches(from)[static_cast<std::size_t>(k)], out);
   }
   if (first == 0 && level > 0) average_unstored(h, field, level, box, out);
   if (level == 0 && !is_nested(h, 0, box)) average_unstored(h, field, 0, box, out);

@@ -52,7 +52,8 @@ struct Box {
     const Vec3i s = size();
     const Vec3i d = i - lower;
     return static_cast<std::size_t>(d.x) +
-           static_cast<std::size_t>(s.x) * (static_cast<std::size_t>(d.y) + static_cast<std::size_t>(s.y) * static_cast<std::size_t>(d.z));
+           static_cast<std::size_t>(s.x) *
+               (static_cast<std::size_t>(d.y) + static_cast<std::size_t>(s.y) * static_cast<std::size_t>(d.z));
   }
 };
 

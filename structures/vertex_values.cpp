@@ -13,7 +13,8 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 /// Level of the leaf with a value that holds the cell of `level`; `level` itself where the
 /// cell is stored there, refined, or has no value.
 int holding_level(const AmrHierarchy& h, int field, int level, const Vec3i& cell) {
-  if (!h.domain(level).contains(cell) || h.find_patch(level, cell) >= 0 || h.refined_within(level, {cell, cell + Vec3i(1)})) return level;
+  if (!h.domain(level).contains(cell) || h.find_patch(level, cell) >= 0 || h.refined_within(level, {cell, cell + Vec3i(1)}))
+    return level;
   for (int coarser = level - 1; coarser >= 0; --coarser) {
     const Vec3i parent = cell / (h.cell_width(coarser) / h.cell_width(level));
     const int patch = h.find_patch(coarser, parent);
@@ -67,7 +68,8 @@ double vertex_value(const AmrHierarchy& h, int field, int level, const Vec3i& ve
 bool all_stored(const AmrHierarchy& h, int level, const Box& box) {
   const Box inside = intersection(box, h.domain(level));
   std::int64_t stored = 0;
-  for (int k : h.patches_in(level, inside)) stored += intersection(h.patches(level)[static_cast<std::size_t>(k)].box, inside).cells();
+  for (int k : h.patches_in(level, inside))
+    stored += intersection(h.patches(level)[static_cast<std::size_t>(k)].box, inside).cells();
   return stored == inside.cells();
 }
 

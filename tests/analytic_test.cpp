@@ -348,6 +348,7 @@ TEST(SamePicture, NearestInEveryEncodingAndPageSize) {
   for (const auto& h : {single_level(waves).hierarchy(), nested(waves).hierarchy(), nested(waves, {4, 2}).hierarchy(),
                         holes_and_missing(waves).hierarchy()})
     for (const Mode mode : {Mode::dvr, Mode::mip}) {
+      if (mode == Mode::mip && !h.has_holes()) continue;
       std::optional<Picture> first;
       for_each_case([&](const EncodingCase& c) {
         if (c.filter != Filter::nearest) return;
@@ -383,7 +384,7 @@ TEST(SamePicture, WithAndWithoutSkipping) {
   for_each_filter([&](const EncodingCase& c) {
     for (const Filtering filtering : c.filterings())
       for (const Mode mode : {Mode::dvr, Mode::projection, Mode::mip}) {
-        if (filtering == Filtering::hardware && mode == Mode::projection) continue;
+        if (filtering == Filtering::hardware && mode != Mode::dvr) continue;
         SCOPED_TRACE(fmt::format("{} {}", mode_name(mode), filtering_name(filtering)));
         const EncodedField field = build(h, c, {.filtering = filtering});
         Scene scene = wave_scene(h, mode);

@@ -418,10 +418,12 @@ TEST(MutationControl, AWrongLevelsWidthIsNoticed) {
       UniformValues uniforms = field_uniforms(h, field);
       for (UniformValue& u : uniforms)
         if (u.name == "u_level_width") std::get<std::vector<int>>(u.numbers)[static_cast<std::size_t>(used)] *= 2;
+      auto defines = field.shader.defines;  // where all ratios are 2 widths follow from the number of levels
+      for (auto& [define, value] : defines) value += define == "AMRTEX_LEVELS" ? 1 : 0;
       const auto cpu = make_cpu_field(field.encoding, Precision::double_precision);
       std::vector<const HostTexture*> textures;
       for (const HostTexture& t : field.textures) textures.push_back(&t);
-      cpu->set(field.shader.defines, uniforms, textures);
+      cpu->set(defines, uniforms, textures);
       bool differs = false;
       try {
         std::vector<ProbeResult> results;

@@ -99,13 +99,13 @@ std::vector<Page> partition(const AmrHierarchy& h, int page_size) {
 
 /// The table: entries of the finest pages' size, in one level or two.
 struct TablePlan {
-  int finest_level = 0;     ///< of any page
-  int top_level = 0;        ///< whose pages have one entry each in the first level of the table
-  Vec3i top{1};             ///< entries of the first level
-  int sub_edge = 1;         ///< entries along the edge of a sub-table; 1: one level
+  int finest_level = 0;  ///< of any page
+  int top_level = 0;     ///< whose pages have one entry each in the first level of the table
+  Vec3i top{1};          ///< entries of the first level
+  int sub_edge = 1;      ///< entries along the edge of a sub-table; 1: one level
   std::int64_t subtables = 0;
   PoolLayout sub_layout;
-  bool green = true;        ///< entries have their second channel
+  bool green = true;  ///< entries have their second channel
   std::int64_t entry_bytes() const { return green ? 8 : 4; }
   bool two_levels() const { return sub_edge > 1; }
   std::int64_t top_bytes() const { return std::int64_t{top.x} * top.y * top.z * entry_bytes(); }
@@ -117,7 +117,8 @@ struct TablePlan {
 
 std::int64_t entries(const Vec3d& n) { return static_cast<std::int64_t>(std::min(n.x * n.y * n.z, 1e18)); }
 
-TablePlan plan_table(const AmrHierarchy& h, const std::vector<Page>& pages, int page_size, const BuildRequest& request, bool constants) {
+TablePlan plan_table(const AmrHierarchy& h, const std::vector<Page>& pages, int page_size, const BuildRequest& request,
+                     bool constants) {
   TablePlan plan;
   plan.green = request.needs.value_ranges || constants;
   for (const Page& p : pages) plan.finest_level = std::max(plan.finest_level, p.level);
@@ -156,9 +157,10 @@ TablePlan plan_table(const AmrHierarchy& h, const std::vector<Page>& pages, int 
     plan.sub_layout = layout;
   }
   if (!plan.two_levels())
-    throw UnsupportedError(fmt::format("encoding page_table with page_size {}: a table of {:.0f} x {:.0f} x {:.0f} entries, and no split in two levels "
-                                       "fits a 3D texture of {} texels an axis; a larger page_size needs fewer entries",
-                                       page_size, one.x, one.y, one.z, limit));
+    throw UnsupportedError(fmt::format(
+        "encoding page_table with page_size {}: a table of {:.0f} x {:.0f} x {:.0f} entries, and no split in two levels "
+        "fits a 3D texture of {} texels an axis; a larger page_size needs fewer entries",
+        page_size, one.x, one.y, one.z, limit));
   return plan;
 }
 
@@ -166,7 +168,11 @@ TablePlan plan_table(const AmrHierarchy& h, const std::vector<Page>& pages, int 
 class PageReader {
  public:
   PageReader(const AmrHierarchy& h, const BuildRequest& request, const Options& options)
-      : hierarchy_(h), request_(request), options_(options), values_(static_cast<std::size_t>(options.page_texels())), missing_(values_.size()) {}
+      : hierarchy_(h),
+        request_(request),
+        options_(options),
+        values_(static_cast<std::size_t>(options.page_texels())),
+        missing_(values_.size()) {}
 
   /// Fills values() and the page's kind, range and constant.
   void read(Page& page) {
@@ -218,7 +224,8 @@ class PageReader {
       any = true;
     }
     page.kind = AMRTEX_PAGE_STORED;
-    if (!any) page.kind = AMRTEX_PAGE_ABSENT;
+    if (!any)
+      page.kind = AMRTEX_PAGE_ABSENT;
     else if (all && page.range.min == page.range.max && constant_is_exact(page.range.min)) {
       page.kind = AMRTEX_PAGE_CONSTANT;
       page.green = std::bit_cast<std::uint32_t>(static_cast<float>(page.range.min));
@@ -226,7 +233,9 @@ class PageReader {
   }
 
   /// The table holds a float: what it would lose, a page of the same storage must lose as well.
-  bool constant_is_exact(double v) const { return request_.storage == Storage::r32f || static_cast<double>(static_cast<float>(v)) == v; }
+  bool constant_is_exact(double v) const {
+    return request_.storage == Storage::r32f || static_cast<double>(static_cast<float>(v)) == v;
+  }
 
   const AmrHierarchy& hierarchy_;
   const BuildRequest& request_;
@@ -251,7 +260,8 @@ class PageTable final : public Encoding {
   std::span<const Filter> filters() const override { return kFilters; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"page_size", "cells along the edge of a page", 16, "4, 8, 16, 32, 64 or 128"},
-            {"centring", "what a texel of a page is: a cell, or a vertex (then the filter is linear_vertex)", "cell", "\"cell\" or \"node\""}};
+            {"centring", "what a texel of a page is: a cell, or a vertex (then the filter is linear_vertex)", "cell",
+             "\"cell\" or \"node\""}};
   }
   void check_parameters(const Json& parameters) const override { values(parameters); }
   Support supported(const ContextInfo&) const override { return {}; }
@@ -267,10 +277,12 @@ Options PageTable::values(const Json& parameters) const {
   Options o{};
   o.page_size = integer_parameter(*this, parameters, "page_size");
   if (o.page_size < 4 || o.page_size > 128 || !std::has_single_bit(static_cast<unsigned>(o.page_size)))
-    throw UsageError(fmt::format("encoding page_table: parameter page_size is {}; accepted: 4, 8, 16, 32, 64 or 128", o.page_size));
+    throw UsageError(
+        fmt::format("encoding page_table: parameter page_size is {}; accepted: 4, 8, 16, 32, 64 or 128", o.page_size));
   const Json& centring = parameters.at("centring");
   if (centring != "cell" && centring != "node")
-    throw UsageError(fmt::format("encoding page_table: parameter centring is {}; accepted: \"cell\" or \"node\"", centring.dump()));
+    throw UsageError(
+        fmt::format("encoding page_table: parameter centring is {}; accepted: \"cell\" or \"node\"", centring.dump()));
   o.nodes = centring == "node";
   return o;
 }
@@ -278,41 +290,48 @@ Options PageTable::values(const Json& parameters) const {
 Options PageTable::options(const Json& parameters, Filter filter) const {
   Options o = values(parameters);
   if (o.nodes != (filter == Filter::linear_vertex))
-    throw UnsupportedError(fmt::format("encoding page_table: centring {} has no filter {}; centring cell has nearest, linear_page and centring node has linear_vertex",
-                                       o.nodes ? "node" : "cell", filter_name(filter)));
+    throw UnsupportedError(
+        fmt::format("encoding page_table: centring {} has no filter {}; centring cell has nearest, linear_page and centring node "
+                    "has linear_vertex",
+                    o.nodes ? "node" : "cell", filter_name(filter)));
   o.border = filter == Filter::linear_page ? 1 : 0;
   o.edge = o.nodes ? o.page_size + 1 : o.page_size + 2 * o.border;
   return o;
 }
 
 /// Exact bytes of a build with so many stored pages; throws when they pass a limit.
-Sizes PageTable::sizes(std::int64_t stored, const Options& o, const TablePlan& table, bool validity, const BuildRequest& request) const {
+Sizes PageTable::sizes(std::int64_t stored, const Options& o, const TablePlan& table, bool validity,
+                       const BuildRequest& request) const {
   Sizes s;
   s.stored = stored;
   const int limit = request.context.max_3d_texture_size;
   if (!lay_out(std::max<std::int64_t>(stored, 1), o.edge, limit, s.pool))
-    throw UnsupportedError(fmt::format("encoding page_table with page_size {}: {} pages of {}^3 texels do not fit a 3D texture of {} texels an axis",
-                                       o.page_size, stored, o.edge, limit));
+    throw UnsupportedError(
+        fmt::format("encoding page_table with page_size {}: {} pages of {}^3 texels do not fit a 3D texture of {} texels an axis",
+                    o.page_size, stored, o.edge, limit));
   const std::int64_t validity_bytes = validity ? stored * o.page_cells() / 8 : 0;
   if (validity_bytes > request.context.max_buffer_bytes)
-    throw UnsupportedError(fmt::format("encoding page_table with page_size {}: validity bits take {} bytes, a buffer of this context at most {}",
-                                       o.page_size, validity_bytes, request.context.max_buffer_bytes));
+    throw UnsupportedError(
+        fmt::format("encoding page_table with page_size {}: validity bits take {} bytes, a buffer of this context at most {}",
+                    o.page_size, validity_bytes, request.context.max_buffer_bytes));
   if (stored > kMostPages)
-    throw UnsupportedError(fmt::format("encoding page_table with page_size {}: {} pages, an entry of the table numbers at most {}", o.page_size, stored,
-                                       kMostPages));
-  require_budget(*this, s.pool_texels() * texel_bytes(request.storage) + table.top_bytes() + table.sub_bytes() + validity_bytes, request);
+    throw UnsupportedError(
+        fmt::format("encoding page_table with page_size {}: {} pages, an entry of the table numbers at most {}", o.page_size,
+                    stored, kMostPages));
+  require_budget(*this, s.pool_texels() * texel_bytes(request.storage) + table.top_bytes() + table.sub_bytes() + validity_bytes,
+                 request);
   return s;
 }
 
-void write_page(const Options& o, const PoolLayout& pool, std::int64_t index, Storage storage, StorageScale scale, std::span<const double> values,
-                HostTexture& texture) {
+void write_page(const Options& o, const PoolLayout& pool, std::int64_t index, Storage storage, StorageScale scale,
+                std::span<const double> values, HostTexture& texture) {
   const Vec3i at = pool.position(index);
   const Box all{Vec3i(0), texture.size};
   const auto edge = static_cast<std::size_t>(o.edge);
   for (int z = 0; z < o.edge; ++z)
     for (int y = 0; y < o.edge; ++y)
-      store_values(storage, scale, &values[edge * (static_cast<std::size_t>(y) + edge * static_cast<std::size_t>(z))], edge, texture.data.data(),
-                   all.offset(at + Vec3i(0, y, z)));
+      store_values(storage, scale, &values[edge * (static_cast<std::size_t>(y) + edge * static_cast<std::size_t>(z))], edge,
+                   texture.data.data(), all.offset(at + Vec3i(0, y, z)));
 }
 
 /// Reads every page to learn what is absent or constant, then numbers the stored ones.
@@ -334,13 +353,16 @@ struct Entry {
 
 void write_entry(HostTexture& texture, const Vec3i& texel, const Entry& entry) {
   const std::size_t i = Box{Vec3i(0), texture.size}.offset(texel);
-  if (texture.format == TexelFormat::r32ui) texture.as<std::uint32_t>()[i] = entry.red;
-  else texture.as<Entry>()[i] = entry;
+  if (texture.format == TexelFormat::r32ui)
+    texture.as<std::uint32_t>()[i] = entry.red;
+  else
+    texture.as<Entry>()[i] = entry;
 }
 
 /// Writes the entries of one page into `table`, the box of entries (pages of `table_level`)
 /// that stand in the texture from texel `at`.
-void write_entries(const AmrHierarchy& h, const Page& page, int table_level, const Box& table, HostTexture& texture, const Vec3i& at) {
+void write_entries(const AmrHierarchy& h, const Page& page, int table_level, const Box& table, HostTexture& texture,
+                   const Vec3i& at) {
   const int r = h.cell_width(page.level) / h.cell_width(table_level);
   const Entry entry{red_of(page.kind, page.level, page.index), page.green};
   for_each_cell(intersection(Box{page.index_in_level, page.index_in_level + Vec3i(1)}.refined(r), table),
@@ -390,7 +412,8 @@ MemoryByRole pool_roles(const AmrHierarchy& h, const Options& o, const std::vect
   return roles;
 }
 
-Json statistics(const AmrHierarchy& h, const Options& o, const std::vector<Page>& pages, const TablePlan& table, std::int64_t stored) {
+Json statistics(const AmrHierarchy& h, const Options& o, const std::vector<Page>& pages, const TablePlan& table,
+                std::int64_t stored) {
   std::int64_t constant = 0;
   std::int64_t absent = 0;
   std::int64_t cells = 0;
@@ -412,6 +435,7 @@ Json statistics(const AmrHierarchy& h, const Options& o, const std::vector<Page>
   json["pages_a_level"] = levels;
   json["page_texels"] = o.page_texels();
   json["border_overhead"] = static_cast<double>(stored * (o.page_texels() - o.page_cells())) / pages_cells;
+  json["border_overhead_formula"] = static_cast<double>(o.page_texels()) / static_cast<double>(o.page_cells()) - 1;
   json["oversampling"] = static_cast<double>(cells) / static_cast<double>(h.leaf_cells());
   json["table_levels"] = table.two_levels() ? 2 : 1;
   json["table_entries"] = table.top_bytes() / table.entry_bytes();
@@ -433,8 +457,8 @@ struct Storages {
 };
 
 /// Reads the stored pages once more and writes their values, validity bits and coded ranges.
-Storages store_pages(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Sizes& size, const EncodedField& field,
-                     std::vector<Page>& pages) {
+Storages store_pages(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Sizes& size,
+                     const EncodedField& field, std::vector<Page>& pages) {
   Storages out;
   out.pool = make_texture("tex_pages", request.storage, size.pool.texels());
   out.pool.hardware_linear = field.filtering == Filtering::hardware;
@@ -452,14 +476,16 @@ Storages store_pages(const AmrHierarchy& h, const BuildRequest& request, const O
       write_page(o, size.pool, page.index, request.storage, field.scale, reader.values(), out.pool);
       if (validity) reader.write_validity(page, out.validity.as<std::uint32_t>() + page.index * words);
       if (request.needs.value_ranges)
-        page.green = encode_range({page.range.min - leak, page.range.max + leak}, field.range_origin, request.storage, field.scale);
+        page.green =
+            encode_range({page.range.min - leak, page.range.max + leak}, field.range_origin, request.storage, field.scale);
     }
   });
   out.pool.roles = pool_roles(h, o, pages, out.pool);
   return out;
 }
 
-void add_shader_inputs(const AmrHierarchy& h, const Options& o, const TablePlan& table, const Sizes& size, bool constants, EncodedField& field) {
+void add_shader_inputs(const AmrHierarchy& h, const Options& o, const TablePlan& table, const Sizes& size, bool constants,
+                       EncodedField& field) {
   auto& defines = field.shader.defines;
   defines.emplace_back("AMRTEX_PAGE_SIZE", o.page_size);
   defines.emplace_back("AMRTEX_PAGE_BORDER", o.border);
@@ -480,10 +506,12 @@ std::vector<LeftOut> left_out(const Options& o, const TablePlan& table, std::int
   std::vector<LeftOut> list;
   if (!validity) list.push_back({"validity bits", "every cell has a value", stored * o.page_cells() / 8});
   if (!table.green)
-    list.push_back({"second channel of the table", "no region is skipped and no page is constant", table.top_bytes() + table.sub_bytes()});
+    list.push_back(
+        {"second channel of the table", "no region is skipped and no page is constant", table.top_bytes() + table.sub_bytes()});
   if (!o.nodes && o.border == 0) {
     const std::int64_t with_border = std::int64_t{o.page_size + 2} * (o.page_size + 2) * (o.page_size + 2);
-    list.push_back({"border layer", "the filter nearest reads one cell", stored * (with_border - o.page_cells()) * texel_bytes(storage)});
+    list.push_back(
+        {"border layer", "the filter nearest reads one cell", stored * (with_border - o.page_cells()) * texel_bytes(storage)});
   }
   return list;
 }
@@ -493,7 +521,8 @@ EncodedField PageTable::build(const AmrHierarchy& h, const BuildRequest& request
   const Json parameters = complete_parameters(*this, request.parameters);
   const Options o = options(parameters, request.needs.filter);
   if (h.level_count() > kMostLevels)
-    throw UnsupportedError(fmt::format("encoding page_table: {} levels, an entry of the table tells at most {}", h.level_count(), kMostLevels));
+    throw UnsupportedError(
+        fmt::format("encoding page_table: {} levels, an entry of the table tells at most {}", h.level_count(), kMostLevels));
   std::vector<Page> pages = partition(h, o.page_size);
   const std::int64_t stored = number_pages(h, request, o, pages);
   const bool constants = std::any_of(pages.begin(), pages.end(), [](const Page& p) { return p.kind == AMRTEX_PAGE_CONSTANT; });

@@ -27,7 +27,8 @@ struct Plan {
   std::int64_t cell_count() const { return std::int64_t{cells.x} * cells.y * cells.z; }
   std::int64_t block_count() const { return std::int64_t{blocks.x} * blocks.y * blocks.z; }
   std::int64_t bytes(Storage storage) const {
-    return texels().cells() * texel_bytes(storage) + (validity ? 4 * words_for_bits(cell_count()) : 0) + (ranges ? 4 * block_count() : 0);
+    return texels().cells() * texel_bytes(storage) + (validity ? 4 * words_for_bits(cell_count()) : 0) +
+           (ranges ? 4 * block_count() : 0);
   }
 };
 
@@ -68,8 +69,9 @@ Plan Uniform::plan(const AmrHierarchy& h, const BuildRequest& request, const Jso
   require_budget(*this, bytes, request);
   const int limit = request.context.max_3d_texture_size;
   if (std::max({p.cells.x, p.cells.y, p.cells.z}) + 2 * p.border > limit)
-    throw UnsupportedError(fmt::format("encoding uniform: level {} has {} x {} x {} cells ({} bytes), a 3D texture of this context at most {} along an axis",
-                                       p.level, p.cells.x, p.cells.y, p.cells.z, bytes, limit));
+    throw UnsupportedError(fmt::format(
+        "encoding uniform: level {} has {} x {} x {} cells ({} bytes), a 3D texture of this context at most {} along an axis",
+        p.level, p.cells.x, p.cells.y, p.cells.z, bytes, limit));
   if (p.validity && 4 * words_for_bits(p.cell_count()) > request.context.max_buffer_bytes)
     throw UnsupportedError(fmt::format("encoding uniform: validity bits take {} bytes, a buffer of this context at most {}",
                                        4 * words_for_bits(p.cell_count()), request.context.max_buffer_bytes));
@@ -111,10 +113,11 @@ struct Writer {
     }
     for (int z = own.lower.z; z < own.upper.z; ++z)
       for (int y = own.lower.y; y < own.upper.y; ++y)
-        store_values(request.storage, scale, &v[box.offset({own.lower.x, y, z})], static_cast<std::size_t>(own.size().x), values.data.data(),
-                     texels.offset({own.lower.x, y, z}));
+        store_values(request.storage, scale, &v[box.offset({own.lower.x, y, z})], static_cast<std::size_t>(own.size().x),
+                     values.data.data(), texels.offset({own.lower.x, y, z}));
     if (ranges != nullptr)
-      ranges->as<std::uint32_t>()[Box{Vec3i(0), plan.blocks}.offset(b)] = encode_range(any ? range : ValueRange{}, range_origin, request.storage, scale);
+      ranges->as<std::uint32_t>()[Box{Vec3i(0), plan.blocks}.offset(b)] =
+          encode_range(any ? range : ValueRange{}, range_origin, request.storage, scale);
   }
 };
 
@@ -134,7 +137,8 @@ EncodedField Uniform::build(const AmrHierarchy& h, const BuildRequest& request) 
   values.holds_values = true;
   values.roles.payload = p.cell_count() * texel_bytes(request.storage);
   values.roles.duplicated = values.bytes() - values.roles.payload;
-  HostTexture validity = p.validity ? make_buffer("dense_validity", TexelFormat::r32ui, words_for_bits(p.cell_count())) : HostTexture{};
+  HostTexture validity =
+      p.validity ? make_buffer("dense_validity", TexelFormat::r32ui, words_for_bits(p.cell_count())) : HostTexture{};
   HostTexture ranges = p.ranges ? make_buffer("dense_ranges", TexelFormat::r32ui, p.block_count()) : HostTexture{};
 
   std::vector<std::uint8_t> missing(p.validity ? static_cast<std::size_t>(p.cell_count()) : 0);
@@ -150,10 +154,14 @@ EncodedField Uniform::build(const AmrHierarchy& h, const BuildRequest& request) 
 
   field.host_peak_bytes = p.bytes(request.storage) + static_cast<std::int64_t>(missing.size());
   field.textures.push_back(std::move(values));
-  if (p.validity) field.textures.push_back(std::move(validity));
-  else field.left_out.push_back({"validity bits", "every cell has a value", 4 * words_for_bits(p.cell_count())});
-  if (p.ranges) field.textures.push_back(std::move(ranges));
-  else field.left_out.push_back({"value ranges", "no region is skipped", 4 * p.block_count()});
+  if (p.validity)
+    field.textures.push_back(std::move(validity));
+  else
+    field.left_out.push_back({"validity bits", "every cell has a value", 4 * words_for_bits(p.cell_count())});
+  if (p.ranges)
+    field.textures.push_back(std::move(ranges));
+  else
+    field.left_out.push_back({"value ranges", "no region is skipped", 4 * p.block_count()});
   field.statistics = {{"blocks", p.block_count()}};
   return field;
 }
