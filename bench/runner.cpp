@@ -101,17 +101,27 @@ class Runner {
       else
         open.push_back(&render);
     }
-    if (open.empty()) return;
+    // a structure holds what its scenes need and nothing else, so each need has its own build
+    for (const bool skip : {false, true}) {
+      std::vector<const RenderPoint*> alike;
+      for (const RenderPoint* render : open)
+        if (render->settings.skip == skip) alike.push_back(render);
+      if (!alike.empty()) measure_all(build, alike);
+    }
+  }
+
+  /// Render points of equal needs.
+  void measure_all(const BuildPoint& build, const std::vector<const RenderPoint*>& renders) {
     std::unique_ptr<Built> built;
     try {
-      built = make(build);
+      built = make(build, renders.front()->settings);
     } catch (const UsageError&) {
       throw;  // a bad parameter concerns the whole experiment
     } catch (const std::exception& error) {
-      for (const RenderPoint* render : open) record_failure(build, *render, failure_of(error));
+      for (const RenderPoint* render : renders) record_failure(build, *render, failure_of(error));
       return;
     }
-    for (const RenderPoint* render : open) {
+    for (const RenderPoint* render : renders) {
       options_.progress(fmt::format("{} {} {} {}", build.encoding, build.parameters.dump(), filter_name(build.filter),
                                     render_json(*render).dump()));
       try {
@@ -124,18 +134,16 @@ class Runner {
     }
   }
 
-  std::unique_ptr<Built> make(const BuildPoint& build) {
+  std::unique_ptr<Built> make(const BuildPoint& build, const RenderSettings& settings) {
     BuildRequest request;
     request.field = field_;
     request.storage = build.storage;
     request.parameters = build.parameters;
     request.context = context_->info();
     request.memory_limit = experiment_.memory_limit.value_or(request.memory_limit);
-    request.needs.filter = build.filter;
-    request.needs.filtering = build.filtering;
-    request.needs.value_ranges = false;
-    for (const RenderPoint& render : experiment_.renders)
-      request.needs.value_ranges = request.needs.value_ranges || render.settings.skip;
+    Scene scene;
+    scene.settings = settings;
+    request.needs = scene_needs(scene, build.filter, build.filtering);
     const Encoding& encoding = find_encoding(build.encoding);
     if (const Support support = encoding.supported(request.context); !support.ok)
       throw UnsupportedError(fmt::format("encoding {}: {}", build.encoding, support.reason));
@@ -258,7 +266,7 @@ class Runner {
     settings.transfer_function = render.transfer_function;
     settings.transfer_function_name = render.transfer_function_name;
     const std::string key = render_json(settings).dump();
-    if (!baseline_) baseline_ = make(*first);
+    if (!baseline_) baseline_ = make(*first, settings.settings);
     if (!baseline_caster_ || key != baseline_key_) {
       baseline_caster_ =
           std::make_unique<Raycaster>(*context_, *mesh_, baseline_->field, *baseline_->gpu, scene_of(experiment_, settings));

@@ -493,10 +493,13 @@ void add_shader_inputs(const AmrHierarchy& h, const Options& o, const TablePlan&
   defines.emplace_back("AMRTEX_PAGE_NODES", o.nodes ? 1 : 0);
   defines.emplace_back("AMRTEX_PAGE_CONSTANTS", constants ? 1 : 0);
   defines.emplace_back("AMRTEX_PAGE_TABLE_LEVELS", table.two_levels() ? 2 : 1);
+  const Vec3i pool = size.pool.texels();
+  defines.emplace_back("AMRTEX_POOL_X", pool.x);
+  defines.emplace_back("AMRTEX_POOL_Y", pool.y);
+  defines.emplace_back("AMRTEX_POOL_Z", pool.z);
   auto& uniforms = field.integer_uniforms;
   uniforms.emplace_back("u_page_table", Vec3i(o.page_size * h.cell_width(table.top_level), 0, 0));
   uniforms.emplace_back("u_pool_shift", size.pool.shift);
-  uniforms.emplace_back("u_pool_texels", size.pool.texels());
   if (!table.two_levels()) return;
   uniforms.emplace_back("u_subtable", Vec3i(table.sub_edge, o.page_size * h.cell_width(table.finest_level), 0));
   uniforms.emplace_back("u_subtable_shift", table.sub_layout.shift);

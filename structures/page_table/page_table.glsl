@@ -16,6 +16,9 @@
 #ifndef AMRTEX_PAGE_CONSTANTS
 #error AMRTEX_PAGE_CONSTANTS must be defined: 1 where constant pages exist, else 0
 #endif
+#ifndef AMRTEX_POOL_X
+#error AMRTEX_POOL_X, _Y and _Z must be defined: texels of the pool along each axis
+#endif
 #ifndef AMRTEX_PAGE_TABLE_LEVELS
 #error AMRTEX_PAGE_TABLE_LEVELS must be defined: 1 or 2
 #endif
@@ -26,6 +29,9 @@ DEFINE_INT(AMRTEX_PAGE_EDGE)
 DEFINE_INT(AMRTEX_PAGE_NODES)
 DEFINE_INT(AMRTEX_PAGE_CONSTANTS)
 DEFINE_INT(AMRTEX_PAGE_TABLE_LEVELS)
+DEFINE_INT(AMRTEX_POOL_X)
+DEFINE_INT(AMRTEX_POOL_Y)
+DEFINE_INT(AMRTEX_POOL_Z)
 
 INTEGER_TEXTURE(tex_page_table)
 #if AMRTEX_CPP || AMRTEX_PAGE_TABLE_LEVELS == 2
@@ -36,7 +42,6 @@ UNIFORM(ivec3, u_subtable_shift)  // log2 of sub-tables along x and y of their t
 VALUE_TEXTURE(tex_pages)
 UNIFORM(ivec3, u_page_table)     // x: width of a table entry, finest cells
 UNIFORM(ivec3, u_pool_shift)     // log2 of pages along x and y of the pool
-UNIFORM(ivec3, u_pool_texels)    // size of the pool
 #if AMRTEX_CPP || AMRTEX_VALIDITY
 BUFFER(uint, page_validity, page_validity_block)  // one bit a cell, each page from a new word
 #endif
@@ -64,7 +69,8 @@ bool locate(IN(Position) p, OUT(Region) r) {
   r.level = page_entry_level(entry.x);
   r.width = level_width(r.level);
   int page_width = AMRTEX_PAGE_SIZE * r.width;
-  r.lower = divide_by_width(p.cell, page_width) * page_width;
+  if (AMRTEX_POWER_OF_TWO != 0) r.lower = p.cell & ivec3(-page_width);
+  else r.lower = divide_by_width(p.cell, page_width) * page_width;
   r.upper = min(r.lower + ivec3(page_width), u_domain_cells);
   r.value_range = vec2r(0);
   int index = page_entry_index(entry.x);
@@ -72,7 +78,7 @@ bool locate(IN(Position) p, OUT(Region) r) {
   r.handle = ivec4(texel.x, texel.y, texel.z, index);
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
   // a cell's centre is its texel's; a vertex sits on the corner, half a texel from its own
-  r.texture_scale = vec3r(1) / vec3r(u_pool_texels);
+  r.texture_scale = vec3r(1.0 / float(AMRTEX_POOL_X), 1.0 / float(AMRTEX_POOL_Y), 1.0 / float(AMRTEX_POOL_Z));
   r.texture_lower = (vec3r(texel) + (AMRTEX_PAGE_NODES != 0 ? vec3r(0.5) : vec3r(AMRTEX_PAGE_BORDER))) * r.texture_scale;
 #endif
   if (AMRTEX_VALUE_RANGES != 0) r.value_range = decode_range(entry.y);
