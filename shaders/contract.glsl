@@ -117,13 +117,6 @@ bool region_contains(IN(Region) r, IN(ivec3) cell) {
   return all(greaterThanEqual(cell, r.lower)) && all(lessThan(cell, r.upper));
 }
 
-// Largest number below 1.
-#if AMRTEX_CPP
-#define AMRTEX_BELOW_ONE (real(1) - std::numeric_limits<real>::epsilon() / real(2))
-#else
-#define AMRTEX_BELOW_ONE 0.99999994
-#endif
-
 // Where a position lies in a region: q, in cell widths of r from its lower corner. Rounding
 // never carries it through the upper face of its cell: floor(q) is that cell.
 vec3r region_position(IN(Region) r, IN(Position) p) {

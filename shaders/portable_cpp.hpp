@@ -4,6 +4,7 @@
 
 #include <glm/glm.hpp>
 #include <glm/integer.hpp>
+#include <limits>
 #include <map>
 #include <span>
 #include <string>
@@ -13,6 +14,7 @@
 #include "structures/host_texture.hpp"
 
 #define AMRTEX_CPP 1
+#define AMRTEX_BELOW_ONE (real(1) - std::numeric_limits<real>::epsilon() / real(2))  // the largest real below 1
 #define IN(T) const T&
 #define OUT(T) T&
 #define INOUT(T) T&

@@ -1,6 +1,7 @@
 // The GLSL half of the portable subset: one text, compiled for the context and,
 // through portable_cpp.hpp, as C++ in float and double (README.md, "Portable subset").
 #define AMRTEX_CPP 0
+#define AMRTEX_BELOW_ONE 0.99999994  // the largest real below 1
 
 #define real float
 #define vec2r vec2
