@@ -115,6 +115,9 @@ void draw_pixel(ReferenceTracer& tracer, const Drawing& drawing, int x, int y, P
     case Mode::mip:
       *pixel = line_maximum(tracer, ray, end);
       break;
+    case Mode::iso:
+    case Mode::dvr_iso:
+      break;
   }
 }
 

@@ -31,18 +31,22 @@ std::pair<std::size_t, double> find_segment(const std::vector<Point>& points, do
 }
 
 template <class Point>
-void check_points(const std::vector<Point>& points, const char* key, bool logarithmic) {
-  if (points.empty()) throw Error(fmt::format("transfer function: '{}' has no point; at least one is needed", key));
+void check_points(const std::vector<Point>& points, const char* what, const char* key, bool logarithmic) {
+  if (points.empty()) throw Error(fmt::format("{}: '{}' has no point; at least one is needed", what, key));
   for (std::size_t k = 0; k < points.size(); ++k) {
     const double v = points[k].value;
-    if (!std::isfinite(v)) throw Error(fmt::format("transfer function: '{}' point {}: the value {} is not finite", key, k, v));
+    if (!std::isfinite(v)) throw Error(fmt::format("{}: '{}' point {}: the value {} is not finite", what, key, k, v));
     if (logarithmic && v <= 0)
-      throw Error(
-          fmt::format("transfer function: '{}' point {}: the value {} must be above 0 on a logarithmic scale", key, k, v));
+      throw Error(fmt::format("{}: '{}' point {}: the value {} must be above 0 on a logarithmic scale", what, key, k, v));
     if (k > 0 && !(v > points[k - 1].value))
-      throw Error(fmt::format("transfer function: '{}' point {}: the value {} does not lie above the one before, {}", key, k, v,
+      throw Error(fmt::format("{}: '{}' point {}: the value {} does not lie above the one before, {}", what, key, k, v,
                               points[k - 1].value));
   }
+}
+
+void check_color(const Vec3d& rgb, std::string_view where) {
+  for (int c = 0; c < 3; ++c)
+    if (!(rgb[c] >= 0 && rgb[c] <= 1)) throw Error(fmt::format("{}: {} must lie between 0 and 1", where, rgb[c]));
 }
 
 void check_keys(const Json& json, const char* what, std::span<const char* const> accepted) {
@@ -153,16 +157,14 @@ double TransferFunction::max_extinction(double min, double max) const {
 }
 
 void validate(const TransferFunction& tf) {
-  check_points(tf.extinction, "extinction", tf.logarithmic);
-  check_points(tf.color, "color", tf.logarithmic);
+  check_points(tf.extinction, "transfer function", "extinction", tf.logarithmic);
+  check_points(tf.color, "transfer function", "color", tf.logarithmic);
   for (std::size_t k = 0; k < tf.extinction.size(); ++k)
     if (!(tf.extinction[k].extinction >= 0))
       throw Error(fmt::format("transfer function: 'extinction' point {}: the extinction {} must not be negative", k,
                               tf.extinction[k].extinction));
   for (std::size_t k = 0; k < tf.color.size(); ++k)
-    for (int c = 0; c < 3; ++c)
-      if (!(tf.color[k].rgb[c] >= 0 && tf.color[k].rgb[c] <= 1))
-        throw Error(fmt::format("transfer function: 'color' point {}: {} must lie between 0 and 1", k, tf.color[k].rgb[c]));
+    check_color(tf.color[k].rgb, fmt::format("transfer function: 'color' point {}", k));
 }
 
 std::string_view mode_name(Mode mode) {
@@ -173,16 +175,83 @@ std::string_view mode_name(Mode mode) {
       return "projection";
     case Mode::mip:
       return "mip";
+    case Mode::iso:
+      return "iso";
+    case Mode::dvr_iso:
+      return "dvr_iso";
   }
   return "";
+}
+
+std::string_view output_name(Output output) {
+  switch (output) {
+    case Output::color:
+      return "color";
+    case Output::depth:
+      return "depth";
+    case Output::normal:
+      return "normal";
+  }
+  return "";
+}
+
+std::string_view shading_name(Shading shading) { return shading == Shading::none ? "none" : "gradient"; }
+
+int RenderSettings::picture_channels() const {
+  if (draws_surfaces()) return isosurfaces.output == Output::depth ? 1 : 4;
+  return mode == Mode::dvr ? 4 : 1;
 }
 
 std::string_view sampling_name(Sampling sampling) { return sampling == Sampling::lattice ? "lattice" : "adaptive"; }
 
 Mode parse_mode(std::string_view name) {
-  for (const Mode mode : {Mode::dvr, Mode::projection, Mode::mip})
+  for (const Mode mode : {Mode::dvr, Mode::projection, Mode::mip, Mode::iso, Mode::dvr_iso})
     if (name == mode_name(mode)) return mode;
-  throw UsageError(fmt::format("unknown mode '{}'; accepted are dvr, projection, mip", name));
+  throw UsageError(fmt::format("unknown mode '{}'; accepted are dvr, projection, mip, iso, dvr_iso", name));
+}
+
+Output parse_output(std::string_view name) {
+  for (const Output output : {Output::color, Output::depth, Output::normal})
+    if (name == output_name(output)) return output;
+  throw UsageError(fmt::format("unknown output '{}'; accepted are color, depth, normal", name));
+}
+
+Shading parse_shading(std::string_view name) {
+  for (const Shading shading : {Shading::none, Shading::gradient})
+    if (name == shading_name(shading)) return shading;
+  throw UsageError(fmt::format("unknown shading '{}'; accepted are none, gradient", name));
+}
+
+void validate(const Isosurfaces& iso) {
+  if (iso.values.empty()) throw UsageError("isosurfaces: 'isovalues' is missing; it accepts a list of field values");
+  if (iso.values.size() > kMostIsovalues)
+    throw UsageError(
+        fmt::format("isosurfaces: 'isovalues' has {} values; at most {} are supported", iso.values.size(), kMostIsovalues));
+  for (std::size_t i = 0; i < iso.values.size(); ++i) {
+    if (!std::isfinite(iso.values[i]))
+      throw UsageError(fmt::format("isosurfaces: 'isovalues' holds {}; it must be finite", iso.values[i]));
+    if (i > 0 && !(iso.values[i] > iso.values[i - 1])) throw UsageError("isosurfaces: 'isovalues' must ascend");
+  }
+  if (!iso.opacity.empty() && iso.opacity.size() != iso.values.size())
+    throw UsageError(
+        fmt::format("isosurfaces: 'iso_opacity' has {} values for {} isovalues; it accepts one number, or one a value",
+                    iso.opacity.size(), iso.values.size()));
+  for (const double o : iso.opacity)
+    if (!(o > 0 && o <= 1)) throw UsageError(fmt::format("isosurfaces: 'iso_opacity' is {}; it must lie in (0, 1]", o));
+  if (iso.color.size() > 16) throw UsageError("isosurfaces: 'surface_color' has more than 16 points");
+  if (!iso.color.empty()) check_points(iso.color, "isosurfaces", "surface_color", false);
+  for (const auto& point : iso.color) check_color(point.rgb, "isosurfaces: 'surface_color'");
+  if (!(iso.tolerance > 0 && iso.tolerance <= 1))
+    throw UsageError(fmt::format("isosurfaces: 'iso_tolerance' is {}; it must lie in (0, 1] cell widths", iso.tolerance));
+}
+
+Vec3d surface_color(const Scene& scene, double value) {
+  TransferFunction map = scene.transfer_function;
+  if (!scene.settings.isosurfaces.color.empty()) {
+    map.color = scene.settings.isosurfaces.color;
+    map.logarithmic = false;
+  }
+  return map.color.empty() ? Vec3d(0.8) : map.color_at(value);
 }
 
 Sampling parse_sampling(std::string_view name) {

@@ -70,12 +70,40 @@ struct TransferFunction {
 /// Throws Error (points not ascending, negative or NaN extinction, none at all, log axis with values <= 0).
 void validate(const TransferFunction& transfer_function);
 
-enum class Mode { dvr, projection, mip };
+/// `iso` draws isosurfaces, `dvr_iso` isosurfaces inside the volume.
+enum class Mode { dvr, projection, mip, iso, dvr_iso };
 enum class Sampling { lattice, adaptive };
+/// What a picture of isosurfaces holds: colour; world distance from the ray's origin to the first surface,
+/// 0 where there is none; or the unit normal there (the gradient's direction), alpha 1, else all 0.
+enum class Output { color, depth, normal };
+/// Light on isosurfaces: none, or a lamp at the eye that lights both sides.
+enum class Shading { none, gradient };
 std::string_view mode_name(Mode mode);
 std::string_view sampling_name(Sampling sampling);
-Mode parse_mode(std::string_view name);          ///< UsageError names the accepted ones
-Sampling parse_sampling(std::string_view name);  ///< UsageError names the accepted ones
+std::string_view output_name(Output output);
+std::string_view shading_name(Shading shading);
+/// These throw UsageErrors that name the accepted ones.
+Mode parse_mode(std::string_view name);
+Sampling parse_sampling(std::string_view name);
+Output parse_output(std::string_view name);
+Shading parse_shading(std::string_view name);
+
+inline constexpr std::size_t kMostIsovalues = 16;
+
+/// Isosurfaces of the drawn field (modes `iso` and `dvr_iso`).
+struct Isosurfaces {
+  std::vector<double> values;   ///< isovalues in field units, ascending; 1 to kMostIsovalues
+  std::vector<double> opacity;  ///< one a value, in (0, 1]; empty = 1
+  std::vector<TransferFunction::ColorPoint>
+      color;                      ///< colour over the isovalue, or over the second field; empty = the transfer function's
+  std::string color_field;        ///< second field whose value on the surface gives its colour; empty = none
+  double tolerance = 1.0 / 1024;  ///< bound on a hit's position along the ray, cell widths as `step`
+  Shading shading = Shading::gradient;
+  Output output = Output::color;
+};
+
+/// Throws UsageError (no isovalue, too many, not ascending, opacities that do not fit, ...).
+void validate(const Isosurfaces& isosurfaces);
 
 struct RenderSettings {
   Mode mode = Mode::dvr;
@@ -85,6 +113,12 @@ struct RenderSettings {
   int height = 512;                 ///< pixels
   bool skip = true;                 ///< regions that the transfer function makes invisible are skipped
   std::optional<double> early_end;  ///< opacity at which a ray ends; off when absent
+  Isosurfaces isosurfaces;
+
+  bool draws_volume() const { return mode == Mode::dvr || (mode == Mode::dvr_iso && isosurfaces.output == Output::color); }
+  bool draws_surfaces() const { return mode == Mode::iso || mode == Mode::dvr_iso; }
+  /// Premultiplied colour (4 channels), or one raw number.
+  int picture_channels() const;
 };
 
 struct Scene {
@@ -93,6 +127,11 @@ struct Scene {
   RenderSettings settings;
   std::optional<std::array<Vec3d, 2>> region;  ///< sub-box to draw: lower and upper, world
 };
+
+/// Colour of a surface where the isovalue, or with a colour field its value there, is `value`.
+Vec3d surface_color(const Scene& scene, double value);
+/// Light that a surface reflects: `cosine` between its normal and the ray; 1 where it has no normal.
+constexpr double surface_light(double cosine) { return 0.25 + 0.75 * (cosine < 0 ? -cosine : cosine); }
 
 /// JSON as in experiment and scene files; Errors name the key and what it accepts.
 View parse_view(const Json& json);
