@@ -103,7 +103,7 @@ class BareMarch {
 struct Bench {
   explicit Bench(const std::string& path) {
     const Experiment experiment = read_experiment(path);
-    mesh.emplace(load_dataset(experiment.datasets.front()));
+    mesh.emplace(load_dataset(experiment, experiment.datasets.front()));
     context = make_context(parse_context_kind(experiment.context));
     RenderPoint render = experiment.renders.front();
     render.settings.sampling = Sampling::lattice;

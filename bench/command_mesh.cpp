@@ -93,7 +93,7 @@ void add_mesh_commands(CLI::App& app, Command& chosen) {
   info->footer("Example: amrtex info data/amrex_tiny/plt00008");
   info->callback([a, &chosen] {
     chosen = [a] {
-      const AmrHierarchy mesh(read_mesh(a->input, a->field.empty() ? std::nullopt : std::optional(a->field)));
+      const AmrHierarchy mesh(read_mesh(a->input, a->field.empty() ? std::vector<std::string>() : std::vector{a->field}));
       if (a->json)
         fmt::print("{}\n", info_json(mesh).dump(2));
       else
@@ -122,7 +122,7 @@ void add_mesh_commands(CLI::App& app, Command& chosen) {
       "them.");
   convert->callback([a, &chosen] {
     chosen = [a] {
-      write_amrex_plotfile(AmrHierarchy(read_mesh(a->input, a->field.empty() ? std::nullopt : std::optional(a->field))),
+      write_amrex_plotfile(AmrHierarchy(read_mesh(a->input, a->field.empty() ? std::vector<std::string>() : std::vector{a->field})),
                            a->output);
       return 0;
     };

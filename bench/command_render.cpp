@@ -37,7 +37,7 @@ int run(const Arguments& a) {
     throw UsageError(fmt::format("-o {}: accepted: a name ending in .png (to look at) or .npy (floats to measure)", a.output));
   const Experiment scene = read_scene(a.scene);
   const BuildPoint& build = scene.builds.front();
-  const AmrHierarchy mesh = load_dataset(scene.datasets[build.dataset]);
+  const AmrHierarchy mesh = load_dataset(scene, scene.datasets[build.dataset]);
   const Scene drawn = scene_of(scene, scene.renders.front());
   const auto context = make_context(parse_context_kind(a.context.empty() ? scene.context : a.context));
   BuildRequest request;
@@ -45,6 +45,8 @@ int run(const Arguments& a) {
   request.parameters = build.parameters;
   request.context = context->info();
   request.needs = scene_needs(drawn, build.filter, build.filtering);
+  request.more_fields = more_fields(mesh, drawn);
+  for (const std::string& warning : scene_warnings(mesh, drawn)) fmt::print(stderr, "warning: {}\n", warning);
   if (!a.memory_limit.empty())
     request.memory_limit = parse_bytes(a.memory_limit);
   else if (scene.memory_limit)

@@ -21,19 +21,20 @@ using Choice = std::vector<std::pair<std::string, JsonNode>>;
 
 constexpr int kMaxPictureEdge = 16384;
 constexpr int kMaxFrames = 1000000;
+constexpr double kAnyNumber = std::numeric_limits<double>::max();
 
-constexpr std::array<std::string_view, 9> kAvailableRenderKeys = {"mode", "sampling",  "step",     "width",     "height",
-                                                                  "skip", "early_end", "consumer", "integrator"};
-constexpr std::array<std::string_view, 5> kLaterRenderKeys = {"tolerance", "prune", "level_of_detail", "isovalues",
-                                                              "clip_planes"};
+constexpr std::array<std::string_view, 16> kAvailableRenderKeys = {
+    "mode",       "sampling",  "step",        "width",         "height",        "skip",    "early_end", "consumer",
+    "integrator", "isovalues", "iso_opacity", "surface_color", "iso_tolerance", "shading", "output",    "color_field"};
+constexpr std::array<std::string_view, 4> kLaterRenderKeys = {"tolerance", "prune", "level_of_detail", "clip_planes"};
 constexpr std::array<std::string_view, 1> kConsumers = {"raycast"};
 constexpr std::array<std::string_view, 1> kIntegrators = {"exponential_midpoint"};
 constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
 
 /// How many lists deep one value of this key is; what lies deeper is an axis.
 int value_depth(std::string_view key) {
-  if (key == "extinction" || key == "color") return 2;
-  constexpr std::array<std::string_view, 8> lists = {"eye",         "at",   "up",    "isovalues",
+  if (key == "extinction" || key == "color" || key == "surface_color") return 2;
+  constexpr std::array<std::string_view, 9> lists = {"eye",         "at",   "up",    "isovalues",  "iso_opacity",
                                                      "clip_planes", "root", "ratio", "skip_levels"};
   return std::find(lists.begin(), lists.end(), key) != lists.end() ? 1 : 0;
 }
@@ -289,7 +290,7 @@ class Parser {
         for (RenderPoint render : settings) {
           render.view = view.view;
           render.view_name = view.view_name;
-          if (render.settings.mode == Mode::dvr) {
+          if (uses_transfer_function(render.settings)) {
             render.transfer_function = function.transfer_function;
             render.transfer_function_name = function.transfer_function_name;
           }
@@ -337,12 +338,61 @@ class Parser {
   static RenderPoint parse_setting(const Choice& choice) {
     RenderPoint point;
     for (const auto& [key, node] : choice) set(point, key, node);
-    if (point.settings.mode != Mode::dvr) point.settings.early_end.reset();  // no opacity to end at
+    if (!point.settings.draws_volume()) point.settings.early_end.reset();  // no opacity to end at
+    if (point.settings.draws_surfaces())
+      finish_surfaces(point.settings.isosurfaces, choice);
+    else
+      point.settings.isosurfaces = {};  // other modes have no use for it
     return point;
+  }
+
+  /// One opacity stands for all isovalues; complaints name the key they are about.
+  static void finish_surfaces(Isosurfaces& iso, const Choice& choice) {
+    if (iso.opacity.size() == 1) iso.opacity.resize(iso.values.size(), iso.opacity.front());
+    try {
+      validate(iso);
+    } catch (const Error& e) {
+      for (const auto& [key, node] : choice)
+        if (std::string_view(e.what()).find("'" + key + "'") != std::string_view::npos) node.fail(e.what());
+      find(choice, "mode")->fail(e.what());
+    }
+  }
+
+  /// Colour of the volume, and of surfaces that have no colours of their own.
+  static bool uses_transfer_function(const RenderSettings& s) {
+    return s.draws_volume() || (s.draws_surfaces() && s.isosurfaces.color.empty() && s.isosurfaces.output == Output::color);
+  }
+
+  static std::vector<double> numbers(const JsonNode& node) {
+    std::vector<double> numbers;
+    for (const JsonNode& item : node.items()) numbers.push_back(item.number(-kAnyNumber, kAnyNumber));
+    return numbers;
+  }
+
+  /// Points [value, r, g, b].
+  static std::vector<TransferFunction::ColorPoint> color_points(const JsonNode& node) {
+    std::vector<TransferFunction::ColorPoint> points;
+    for (const JsonNode& item : node.items()) {
+      const std::vector<double> p = numbers(item);
+      if (p.size() != 4) item.fail("accepted: points [value, r, g, b]");
+      points.push_back({p[0], {p[1], p[2], p[3]}});
+    }
+    return points;
+  }
+
+  static void set_surfaces(Isosurfaces& iso, const std::string& key, const JsonNode& node) {
+    if (key == "isovalues") iso.values = numbers(node);
+    if (key == "iso_opacity") iso.opacity = numbers(node);
+    if (key == "surface_color") iso.color = color_points(node);
+    if (key == "iso_tolerance") iso.tolerance = node.positive_number();
+    if (key == "shading") iso.shading = located(node, [&] { return parse_shading(node.text()); });
+    if (key == "output") iso.output = located(node, [&] { return parse_output(node.text()); });
+    if (key == "color_field" && !node.json().is_null()) iso.color_field = node.text();
   }
 
   static void set(RenderPoint& point, const std::string& key, const JsonNode& node) {
     RenderSettings& s = point.settings;
+    set_surfaces(s.isosurfaces, key, node);
     if (key == "mode") s.mode = located(node, [&] { return parse_mode(node.text()); });
     if (key == "sampling") s.sampling = located(node, [&] { return parse_sampling(node.text()); });
     if (key == "step") s.step = node.positive_number();
@@ -415,9 +465,9 @@ class Parser {
 
   void require_no_transfer_function() {
     for (const RenderPoint& point : parse_settings())
-      if (point.settings.mode == Mode::dvr)
+      if (point.settings.draws_volume())
         root_.fail(
-            "the key 'transfer_function' is missing: mode dvr needs {\"extinction\": [[value, extinction], ...], "
+            "the key 'transfer_function' is missing: a volume needs {\"extinction\": [[value, extinction], ...], "
             "\"color\": [[value, r, g, b], ...]}");
   }
 
@@ -519,6 +569,19 @@ Scene scene_of(const Experiment& experiment, const RenderPoint& render) {
   return Scene{render.view, render.transfer_function, render.settings, experiment.region};
 }
 
+Json surfaces_json(const Isosurfaces& iso) {
+  Json json;
+  json["isovalues"] = iso.values;
+  json["iso_opacity"] = iso.opacity.empty() ? std::vector<double>(iso.values.size(), 1.0) : iso.opacity;
+  json["surface_color"] = nullptr;
+  for (const auto& p : iso.color) json["surface_color"].push_back({p.value, p.rgb.r, p.rgb.g, p.rgb.b});
+  json["color_field"] = iso.color_field.empty() ? Json() : Json(iso.color_field);
+  json["iso_tolerance"] = iso.tolerance;
+  json["shading"] = shading_name(iso.shading);
+  json["output"] = output_name(iso.output);
+  return json;
+}
+
 Json render_json(const RenderPoint& render) {
   const RenderSettings& s = render.settings;
   Json json = {{"consumer", render.consumer},
@@ -534,6 +597,7 @@ Json render_json(const RenderPoint& render) {
                {"view_name", render.view_name},
                {"transfer_function", nullptr},
                {"transfer_function_name", nullptr}};
+  if (s.draws_surfaces()) json.update(surfaces_json(s.isosurfaces));
   if (!render.transfer_function_name.empty()) {
     json["transfer_function"] = to_json(render.transfer_function);
     json["transfer_function_name"] = render.transfer_function_name;

@@ -88,6 +88,9 @@ Experiment parse_scene(std::string text, const std::filesystem::path& path);
 /// The scene of one render point.
 Scene scene_of(const Experiment& experiment, const RenderPoint& render);
 
+/// What a record and the name of a reference hold of isosurfaces.
+Json surfaces_json(const Isosurfaces& isosurfaces);
+
 /// The `render` part of a record, names of view and transfer function included.
 Json render_json(const RenderPoint& render);
 

@@ -81,11 +81,9 @@ class Runner {
     if (mesh_ && loaded_ == dataset) return;
     baseline_.reset();
     baseline_caster_.reset();
-    mesh_.emplace(load_dataset(experiment_.datasets[dataset]));
+    mesh_.emplace(load_dataset(experiment_, experiment_.datasets[dataset]));
     loaded_ = dataset;
-    const auto& name = experiment_.datasets[dataset].field;
-    field_ = name ? mesh_->field_index(*name) : 0;
-    mesh_hash_ = mesh_->content_hash(field_);
+    mesh_hash_ = mesh_->content_hash(0);
   }
 
   std::string hash_of(const BuildPoint& build, const RenderPoint& render) const {
@@ -102,12 +100,19 @@ class Runner {
         open.push_back(&render);
     }
     // a structure holds what its scenes need and nothing else, so each need has its own build
-    for (const bool skip : {false, true}) {
-      std::vector<const RenderPoint*> alike;
-      for (const RenderPoint* render : open)
-        if (render->settings.skip == skip) alike.push_back(render);
-      if (!alike.empty()) measure_all(build, alike);
+    while (!open.empty()) {
+      const auto differ = std::stable_partition(open.begin(), open.end(),
+                                                [&](const RenderPoint* r) { return equal_needs(build, *r, *open.front()); });
+      measure_all(build, {open.begin(), differ});
+      open.erase(open.begin(), differ);
     }
+  }
+
+  bool equal_needs(const BuildPoint& build, const RenderPoint& a, const RenderPoint& b) const {
+    const Scene first = scene_of(experiment_, a);
+    const Scene second = scene_of(experiment_, b);
+    return scene_needs(first, build.filter, build.filtering) == scene_needs(second, build.filter, build.filtering) &&
+           first.settings.isosurfaces.color_field == second.settings.isosurfaces.color_field;
   }
 
   /// Render points of equal needs.
@@ -136,7 +141,6 @@ class Runner {
 
   std::unique_ptr<Built> make(const BuildPoint& build, const RenderSettings& settings) {
     BuildRequest request;
-    request.field = field_;
     request.storage = build.storage;
     request.parameters = build.parameters;
     request.context = context_->info();
@@ -144,6 +148,7 @@ class Runner {
     Scene scene;
     scene.settings = settings;
     request.needs = scene_needs(scene, build.filter, build.filtering);
+    request.more_fields = more_fields(*mesh_, scene);
     const Encoding& encoding = find_encoding(build.encoding);
     if (const Support support = encoding.supported(request.context); !support.ok)
       throw UnsupportedError(fmt::format("encoding {}: {}", build.encoding, support.reason));
@@ -171,6 +176,7 @@ class Runner {
     record["first_frame_ms"] = first_frame_ms;
     record["image_hash"] = picture_hash(picture);
     record["context"]["shader_hash"] = raycaster.shader_hash();
+    for (const std::string& text : scene_warnings(*mesh_, scene)) warn(record, text);
     if (!raycaster.transfer_exact())
       warn(record, "the transfer function has more than 16 points: it is drawn from a table of 4096 bins");
     if (!add_errors(record, picture, built.field, scene)) {
@@ -286,7 +292,7 @@ class Runner {
                          {"stored_cells", mesh_->stored_cells()},
                          {"levels", mesh_->level_count()},
                          {"patches", patches},
-                         {"field", mesh_->fields()[static_cast<std::size_t>(field_)]}};
+                         {"field", mesh_->fields().front()}};
     record["encoding"] = build.encoding;
     record["build_parameters"] = built != nullptr ? built->field.build_parameters : build.parameters;
     record["filter"] = filter_name(build.filter);
@@ -340,7 +346,6 @@ class Runner {
   RunSummary summary_;
   std::optional<AmrHierarchy> mesh_;
   std::size_t loaded_ = 0;
-  int field_ = 0;
   std::string mesh_hash_;
   std::unique_ptr<Built> baseline_;
   std::unique_ptr<Raycaster> baseline_caster_;
@@ -349,10 +354,34 @@ class Runner {
 
 }  // namespace
 
-AmrHierarchy load_dataset(const DatasetSource& source) {
-  AmrHierarchy mesh(source.file ? read_mesh(*source.file, source.field) : generate_mesh(source.generate));
-  if (source.field) mesh.field_index(*source.field);
-  return mesh;
+AmrHierarchy load_dataset(const Experiment& experiment, const DatasetSource& source) {
+  if (!source.file) return AmrHierarchy(generate_mesh(source.generate));
+  std::vector<std::string> fields;  // empty: all of them
+  if (source.field) {
+    fields.push_back(*source.field);
+    for (const RenderPoint& render : experiment.renders) {
+      const std::string& color = render.settings.isosurfaces.color_field;
+      if (!color.empty() && std::find(fields.begin(), fields.end(), color) == fields.end()) fields.push_back(color);
+    }
+  }
+  return AmrHierarchy(read_mesh(*source.file, fields));
+}
+
+std::vector<int> more_fields(const AmrHierarchy& hierarchy, const Scene& scene) {
+  const std::string& color = scene.settings.isosurfaces.color_field;
+  if (!scene.settings.draws_surfaces() || color.empty()) return {};
+  return {hierarchy.field_index(color)};
+}
+
+std::vector<std::string> scene_warnings(const AmrHierarchy& hierarchy, const Scene& scene) {
+  std::vector<std::string> warnings;
+  if (!scene.settings.draws_surfaces()) return warnings;
+  const FieldStatistics& range = hierarchy.statistics(0);
+  for (const double isovalue : scene.settings.isosurfaces.values)
+    if (!(isovalue >= range.min && isovalue <= range.max))
+      warnings.push_back(fmt::format("isovalue {} lies outside the range of {}, {} to {}: it has no surface", isovalue,
+                                     hierarchy.fields().front(), range.min, range.max));
+  return warnings;
 }
 
 Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definition, const Scene& scene, double step,
@@ -368,7 +397,12 @@ Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definit
   key["mode"] = mode_name(scene.settings.mode);
   key["size"] = {scene.settings.width, scene.settings.height};
   key["view"] = to_json(scene.view);
-  if (scene.settings.mode == Mode::dvr) key["transfer_function"] = to_json(scene.transfer_function);
+  if (scene.settings.draws_surfaces()) {
+    key["isosurfaces"] = surfaces_json(scene.settings.isosurfaces);
+    for (const int field : more_fields(hierarchy, scene)) key["color_field"] = hierarchy.content_hash(field);
+  }
+  if (scene.settings.draws_volume() || scene.settings.draws_surfaces())
+    key["transfer_function"] = to_json(scene.transfer_function);
   if (scene.region)
     for (const Vec3d& corner : *scene.region) key["region"].push_back({corner.x, corner.y, corner.z});
   key["step"] = step;

@@ -32,8 +32,15 @@ struct RunSummary {
 /// become records too; throws only for what concerns the whole experiment.
 RunSummary run_experiment(const Experiment& experiment, const RunOptions& options);
 
-/// The mesh of one data set of an experiment, with the field that is wanted first.
-AmrHierarchy load_dataset(const DatasetSource& source);
+/// The mesh of one data set of an experiment, with the field that is wanted first, and after it
+/// those that some render point colours surfaces by.
+AmrHierarchy load_dataset(const Experiment& experiment, const DatasetSource& source);
+
+/// Fields beside the drawn one that the scene fetches. Throws UsageError naming the fields there are.
+std::vector<int> more_fields(const AmrHierarchy& hierarchy, const Scene& scene);
+
+/// What is legal about a scene of field 0 of this mesh, and yet likely not meant.
+std::vector<std::string> scene_warnings(const AmrHierarchy& hierarchy, const Scene& scene);
 
 /// The picture of the scene by the double reference of `definition`, from the cache
 /// below `folder` where it was drawn before. `hash` receives the name of that file.

@@ -34,8 +34,8 @@ class CpuShader final : public CpuField {
   std::array<double, 4> trace(double x, double y) const override {
     typename Shader::Ray ray;
     typename Shader::Accumulation a = text().empty_accumulation();
-    if (!text().camera_ray(glm::vec<2, real>(x, y), ray)) return {0, 0, 0, text().AMRTEX_MODE == 0 ? 0.0 : 1.0};
-    const auto c = text().march_ray(ray, a);
+    const bool met = text().camera_ray(glm::vec<2, real>(x, y), ray);
+    const auto c = met ? text().march_ray(ray, a) : text().missed_picture();
     return {static_cast<double>(c.x), static_cast<double>(c.y), static_cast<double>(c.z), static_cast<double>(c.w)};
   }
 

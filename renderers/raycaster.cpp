@@ -67,7 +67,7 @@ FrameTime Raycaster::draw() {
   return {wall.count(), timer_.milliseconds()};
 }
 
-Picture Raycaster::read() const { return target_.read_picture(scene_.settings.mode == Mode::dvr ? 4 : 1); }
+Picture Raycaster::read() const { return target_.read_picture(scene_.settings.picture_channels()); }
 
 WorkCounts Raycaster::count() {
   Program counting = make_program(true);
@@ -96,7 +96,7 @@ Picture render_on_cpu(const AmrHierarchy& hierarchy, const EncodedField& field, 
   for (const HostTexture& t : bindings.buffers) textures.push_back(&t);
   cpu->set(defines, bindings.uniforms, textures);
   const RenderSettings& s = scene.settings;
-  Picture picture(s.width, s.height, s.mode == Mode::dvr ? 4 : 1);
+  Picture picture(s.width, s.height, s.picture_channels());
   tbb::parallel_for(0, s.height, [&](int y) {
     for (int x = 0; x < s.width; ++x) {
       const auto value = cpu->trace(x + 0.5, s.height - y - 0.5);

@@ -131,7 +131,7 @@ struct Scene {
 /// Colour of a surface where the isovalue, or with a colour field its value there, is `value`.
 Vec3d surface_color(const Scene& scene, double value);
 /// Light that a surface reflects: `cosine` between its normal and the ray; 1 where it has no normal.
-constexpr double surface_light(double cosine) { return 0.25 + 0.75 * (cosine < 0 ? -cosine : cosine); }
+constexpr double surface_light(double cosine) { return 0.1 + 0.9 * (cosine < 0 ? -cosine : cosine); }
 
 /// JSON as in experiment and scene files; Errors name the key and what it accepts.
 View parse_view(const Json& json);

@@ -113,6 +113,33 @@ void add_camera(const AmrHierarchy& h, const Scene& scene, UniformValues& unifor
   uniforms.push_back({"u_picture_size", std::vector<double>{static_cast<double>(s.width), static_cast<double>(s.height)}});
 }
 
+/// Bisections after which an interval between two samples is no longer than the tolerance.
+int bisections(const RenderSettings& s) {
+  return std::clamp(static_cast<int>(std::ceil(std::log2(s.step / s.isosurfaces.tolerance))), 1, 32);
+}
+
+/// Optical depth of a surface; of an opaque one so much that nothing is left.
+double surface_depth(double opacity) { return opacity < 1 ? -std::log1p(-opacity) : 1e4; }
+
+void add_surfaces(const Scene& scene, SceneBindings& b) {
+  const Isosurfaces& iso = scene.settings.isosurfaces;
+  validate(iso);
+  std::vector<double> light;
+  for (std::size_t i = 0; i < iso.values.size(); ++i) {
+    const Vec3d rgb = surface_color(scene, iso.values[i]);
+    light.insert(light.end(), {rgb.r, rgb.g, rgb.b, surface_depth(iso.opacity.empty() ? 1 : iso.opacity[i])});
+  }
+  b.uniforms.push_back({"u_isovalues", iso.values});
+  b.uniforms.push_back({"u_surface_light", light});
+  b.uniforms.push_back({"u_surface_ambient", std::vector<double>{surface_light(0)}});
+  b.uniforms.push_back({"u_bisections", std::vector<int>{bisections(scene.settings)}});
+  b.defines.emplace_back("AMRTEX_OUTPUT", static_cast<int>(iso.output));
+  b.defines.emplace_back("AMRTEX_SHADING", iso.shading == Shading::gradient ? 1 : 0);
+}
+
+/// What the shader draws: pictures of depth and normals have no volume.
+Mode shader_mode(const RenderSettings& s) { return s.mode == Mode::dvr_iso && !s.draws_volume() ? Mode::iso : s.mode; }
+
 }  // namespace
 
 UniformValues field_uniforms(const AmrHierarchy& h, const EncodedField& field) {
@@ -143,7 +170,7 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
   int extinction_points = 1;
   int color_points = 1;
   int invisible_count = 0;
-  if (s.mode == Mode::dvr) {
+  if (s.draws_volume()) {
     const TransferFunction& tf = scene.transfer_function;
     const double per_unit = tf.length_unit == TransferFunction::LengthUnit::world ? unit : unit / longest;
     b.transfer_exact = std::max(tf.extinction.size(), tf.color.size()) <= kMostPoints;
@@ -164,14 +191,16 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
     if (invisible_count > 0) b.uniforms.push_back({"u_invisible_ranges", invisible});
   }
   b.defines = {{"AMRTEX_RAY_DOUBLE", needs_double_rays(h, scene) ? 1 : 0},
-               {"AMRTEX_LOGARITHMIC", s.mode == Mode::dvr && scene.transfer_function.logarithmic ? 1 : 0},
+               {"AMRTEX_LOGARITHMIC", s.draws_volume() && scene.transfer_function.logarithmic ? 1 : 0},
                {"AMRTEX_EXTINCTION_POINTS", extinction_points},
                {"AMRTEX_COLOR_POINTS", color_points},
                {"AMRTEX_INVISIBLE_RANGES", invisible_count},
-               {"AMRTEX_MODE", static_cast<int>(s.mode)},
+               {"AMRTEX_MODE", static_cast<int>(shader_mode(s))},
                {"AMRTEX_LATTICE", s.sampling == Sampling::lattice ? 1 : 0},
                {"AMRTEX_SKIP", s.skip ? 1 : 0},
-               {"AMRTEX_EARLY_END", s.early_end && s.mode == Mode::dvr ? 1 : 0}};
+               {"AMRTEX_EARLY_END", s.early_end && s.draws_volume() ? 1 : 0},
+               {"AMRTEX_ISOVALUES", s.draws_surfaces() ? static_cast<int>(s.isosurfaces.values.size()) : 0}};
+  if (s.draws_surfaces()) add_surfaces(scene, b);
   return b;
 }
 
@@ -180,6 +209,7 @@ SceneNeeds scene_needs(const Scene& scene, Filter filter, Filtering filtering) {
   needs.filter = filter;
   needs.filtering = filter == Filter::nearest ? Filtering::manual : filtering;
   needs.value_ranges = scene.settings.skip;
+  needs.gradients = scene.settings.draws_surfaces() && scene.settings.isosurfaces.shading == Shading::gradient;
   return needs;
 }
 

@@ -1,8 +1,5 @@
 // The one integration loop: raycaster, CPU renderer and later consumers share it.
 #if !AMRTEX_CPP
-#ifndef AMRTEX_MODE
-#error AMRTEX_MODE must be defined: one of the AMRTEX_MODE_... below
-#endif
 #ifndef AMRTEX_LATTICE
 #error AMRTEX_LATTICE must be defined: 1 for lattice sampling, 0 for adaptive
 #endif
@@ -16,85 +13,55 @@
 #error AMRTEX_COUNT must be defined: 1 where samples and regions are counted, else 0
 #endif
 #endif
-DEFINE_INT(AMRTEX_MODE)
 DEFINE_INT(AMRTEX_LATTICE)
 DEFINE_INT(AMRTEX_SKIP)
 DEFINE_INT(AMRTEX_EARLY_END)
 DEFINE_INT(AMRTEX_COUNT)
 DEFINE_INT(AMRTEX_RAY_DOUBLE)
 
-// the same numbers as enum class Mode (renderers/scene.hpp)
-#define AMRTEX_MODE_DVR 0
-#define AMRTEX_MODE_PROJECTION 1
-#define AMRTEX_MODE_MIP 2
-
-UNIFORM(real, u_step)           // cell widths: of the finest level (lattice) or of the region (adaptive)
-UNIFORM(real, u_early_end)      // transmittance at which a ray ends
-UNIFORM(real, u_length_unit)    // world length of one unit of ray length (projection)
-
-STRUCT Accumulation {
-  vec3r color;         // premultiplied
-  real transmittance;
-  real sum;            // optical depth, or the line integral in units of ray length ...
-  real lost;           // ... and what its float sum has lost so far (Kahan): long rays must not drift
-  real maximum;
-  ivec3 counted;       // samples, regions, regions skipped
-};
-
-Accumulation empty_accumulation() {
-  Accumulation a;
-  a.color = vec3r(0);
-  a.transmittance = real(1);
-  a.sum = real(0);
-  a.lost = real(0);
-  a.maximum = real(-3.0e38);
-  a.counted = ivec3(0);
-  return a;
-}
-
-void add_compensated(INOUT(Accumulation) a, IN(real) amount) {
-  PRECISE real y = amount - a.lost;
-  PRECISE real t = a.sum + y;
-  PRECISE real lost = (t - a.sum) - y;
-  a.lost = lost;
-  a.sum = t;
-}
-
-// One interval of the exponential midpoint rule: `value` at its middle, `length` in units.
-void accumulate(INOUT(Accumulation) a, IN(real) value, IN(real) length) {
-  if (AMRTEX_MODE == AMRTEX_MODE_DVR) {
-    vec4r light = transfer(value);
-    if (light.w > real(0)) {
-      PRECISE real depth = min(light.w * length, real(1e4));  // exp(-1e4) is 0; infinity would become NaN
-      add_compensated(a, depth);
-      real transmittance = min(exp(-a.sum), a.transmittance);
-      PRECISE vec3r color = a.color + vec3r(light.x, light.y, light.z) * (a.transmittance - transmittance);
-      a.color = color;
-      a.transmittance = transmittance;
-    }
-  } else if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION) {
-    PRECISE real part = value * length;
-    add_compensated(a, part);
-  } else {
-    a.maximum = max(a.maximum, value);
-  }
-}
+UNIFORM(real, u_step)       // cell widths: of the finest level (lattice) or of the region (adaptive)
+UNIFORM(real, u_early_end)  // transmittance at which a ray ends
 
 bool ray_ended(IN(Accumulation) a) { return AMRTEX_EARLY_END != 0 && a.transmittance <= u_early_end; }
+
+// Does the loop over samples end here: at the ray's end, or at a surface that is drawn first?
+bool ray_stopped(IN(Accumulation) a) { return ray_ended(a) || (AMRTEX_ISOVALUES != 0 && a.crossing); }
 
 // May the region be left out without changing the picture?
 bool region_invisible(IN(Accumulation) a, IN(Region) r) {
   if (AMRTEX_SKIP == 0 || AMRTEX_VALUE_RANGES == 0) return false;
-  if (AMRTEX_MODE == AMRTEX_MODE_DVR) return !transfer_visible(r.value_range);
+#if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
+  if (AMRTEX_ISOVALUES != 0 && !on_one_side(a, r.value_range)) return false;
+#endif
+  if (AMRTEX_DRAWS_VOLUME) return !transfer_visible(r.value_range);
+  if (AMRTEX_MODE == AMRTEX_MODE_ISO) return true;
   if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION) return r.value_range.x == real(0) && r.value_range.y == real(0);
   return r.value_range.y <= a.maximum;
 }
 
-void take_sample(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q, IN(real) length) {
+// The sample at `at`, whose interval begins at `begin` (units of ray length; only isosurfaces use them).
+void take_sample(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q, IN(real) length, IN(ray_real) begin, IN(ray_real) at) {
   real value = fetch_field(r, q);
   if (AMRTEX_COUNT != 0) a.counted.x += 1;
-  if (AMRTEX_VALIDITY != 0 && is_no_value(value)) return;
+  bool missing = AMRTEX_VALIDITY != 0 && is_no_value(value);
+#if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
+  if (AMRTEX_ISOVALUES != 0) {
+    note_side(a, missing, value, begin, at);
+    if (a.crossing) return;  // the surface comes first; this sample is taken again after it
+  }
+#endif
+  if (missing) return;
   accumulate(a, value, length);
+}
+
+// A region that is not sampled, up to `exit`: a ray passes on its side, and loses it where there is no mesh.
+void pass_region(INOUT(Accumulation) a, IN(bool) inside, IN(Region) r, IN(ray_real) exit) {
+#if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
+  if (AMRTEX_ISOVALUES != 0) {
+    a.below = inside ? isovalues_below(r.value_range.x) : -1;
+    a.before = exit;
+  }
+#endif
 }
 
 void count_region(INOUT(Accumulation) a, IN(bool) skipped) {
@@ -102,6 +69,14 @@ void count_region(INOUT(Accumulation) a, IN(bool) skipped) {
   a.counted.y += 1;
   if (skipped) a.counted.z += 1;
 }
+
+// From where a ray is marched on after a surface.
+STRUCT Front {
+  int next;          // lattice: the next sample
+  ray_real t;        // adaptive: where the region begins, ...
+  Position p;        // ... the same as a position, ...
+  real part;         // ... and the middle of its next interval, in intervals
+};
 
 // ---- lattice: sample k of a ray lies at the middle of [k, k + 1) steps from the entry,
 // a position that depends on the ray and k alone. Positions are anchored anew every
@@ -115,6 +90,7 @@ STRUCT LatticeBlock {
   ivec3 cell;      // anchor: finest cell ...
   vec3r fraction;  // ... and fraction, in quanta
   vec3r step;      // quanta a sample
+  int first;       // its first sample, counted from the ray's entry
 };
 
 LatticeBlock lattice_block(IN(Ray) ray, IN(int) first) {
@@ -124,6 +100,7 @@ LatticeBlock lattice_block(IN(Ray) ray, IN(int) first) {
   block.cell = anchor.cell;
   block.fraction = anchor.fraction * AMRTEX_QUANTA;
   block.step = vec3r(ray.direction) * (u_step * AMRTEX_QUANTA);
+  block.first = first;
   return block;
 }
 
@@ -190,16 +167,21 @@ vec3r lattice_q(IN(LatticeBlock) block, IN(LatticeFrame) frame, IN(Region) r, IN
   return q_large;
 }
 
-void march_lattice_region(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(Region) r, IN(int) first, IN(int) next) {
+// Where sample i of the block lies, or with - 1/2 where its interval begins (units of ray length).
+ray_real lattice_place(IN(LatticeBlock) block, IN(real) i) { return ray_real(u_step) * (ray_real(block.first) + ray_real(i)); }
+
+// Returns the sample that lies across a surface, or `next`.
+int march_lattice_region(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(Region) r, IN(int) first, IN(int) next) {
   LatticeFrame frame = lattice_frame(block, r);
   real i = real(first);
   real end = real(next);
   if (i < end) {
     do {
-      take_sample(a, r, lattice_q(block, frame, r, i), u_step);
+      take_sample(a, r, lattice_q(block, frame, r, i), u_step, lattice_place(block, i), lattice_place(block, i + real(0.5)));
       i += real(1);
-    } while (i < end && !ray_ended(a));
+    } while (i < end && !ray_stopped(a));
   }
+  return AMRTEX_ISOVALUES != 0 && a.crossing ? int(i) - 1 : next;
 }
 
 // 1 / v without infinities: a ray along a face never ends a region through it.
@@ -208,9 +190,10 @@ vec3r safe_inverse(IN(vec3r) v) {
   return real(1) / (v + tiny);
 }
 
-void march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) count) {
+// From sample `from` of the block; returns the one across a surface, or `count`.
+int march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) from, IN(int) count) {
   vec3r inverse_step = safe_inverse(block.step);
-  int i = 0;
+  int i = from;
   if (i < count) {
     do {
       Region r;
@@ -226,40 +209,45 @@ void march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) 
         i = lattice_exit(block, inverse_step, r, i, count);
         skipped = !inside || region_invisible(a, r);
         count_region(a, skipped);
+        if (skipped) pass_region(a, inside, r, lattice_place(block, real(i) - real(0.5)));
       } while (skipped && i < count);
-      if (!skipped) march_lattice_region(a, block, r, first, i);
-    } while (i < count && !ray_ended(a));
+      if (!skipped) i = march_lattice_region(a, block, r, first, i);
+    } while (i < count && !ray_stopped(a));
   }
+  return i;
 }
 
 // The interval that is left after `whole` full ones.
 void march_lattice_rest(INOUT(Accumulation) a, IN(Ray) ray, IN(int) whole) {
   ray_real start = ray_real(u_step) * ray_real(whole);
+  ray_real middle = (start + ray.length) * ray_real(0.5);
   real length = real(ray.length - start);
   LatticeBlock block;
-  Position p = make_position(ray.entry + ray.direction * ((start + ray.length) * ray_real(0.5)));
+  Position p = make_position(ray.entry + ray.direction * middle);
   block.cell = p.cell;
   block.fraction = p.fraction * AMRTEX_QUANTA;
   block.step = vec3r(0);
+  block.first = whole;
   Region r;
   bool inside = locate(p, r);
   bool skipped = !inside || region_invisible(a, r);
   count_region(a, skipped);
-  if (!skipped) take_sample(a, r, lattice_q(block, lattice_frame(block, r), r, real(0)), length);
+  if (!skipped) take_sample(a, r, lattice_q(block, lattice_frame(block, r), r, real(0)), length, start, middle);
 }
 
 // Three nested loops (blocks, regions, samples): what is computed in an inner one is paid
 // by every lane of a SIMD group at every turn.
-void march_lattice(IN(Ray) ray, INOUT(Accumulation) a) {
+void march_lattice(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
   int whole = int(floor(ray.length / ray_real(u_step)));
-  int first = 0;
+  int first = AMRTEX_ISOVALUES == 0 ? 0 : front.next & ~(AMRTEX_BLOCK - 1);
   if (first < whole) {
     do {
-      march_lattice_block(a, lattice_block(ray, first), min(whole - first, AMRTEX_BLOCK));
+      int from = AMRTEX_ISOVALUES == 0 ? 0 : max(front.next - first, 0);
+      front.next = first + march_lattice_block(a, lattice_block(ray, first), from, min(whole - first, AMRTEX_BLOCK));
       first += AMRTEX_BLOCK;
-    } while (first < whole && !ray_ended(a));
+    } while (first < whole && !ray_stopped(a));
   }
-  if (ray_real(u_step) * ray_real(whole) < ray.length && !ray_ended(a)) march_lattice_rest(a, ray, whole);
+  if (ray_real(u_step) * ray_real(whole) < ray.length && !ray_stopped(a)) march_lattice_rest(a, ray, whole);
 }
 
 // ---- adaptive: each region is divided into equal intervals of at most `step` of its own cells.
@@ -280,26 +268,30 @@ Position leave_region(IN(Ray) ray, IN(Region) r, IN(ray_real) t, IN(bvec3) throu
   return p;
 }
 
-void march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(vec3r) direction, IN(real) length) {
+// From interval middle `from` on; returns that across a surface, or of the last sample.
+real march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(vec3r) direction, IN(real) length, IN(ray_real) begin,
+                           IN(real) from) {
   real inverse_width = real(1) / real(r.width);
   real count = max(ceil(length * inverse_width / u_step - real(1e-4)), real(1));
   real interval = length / count;
   vec3r q0 = f * inverse_width;
   vec3r dq = direction * (interval * inverse_width);
-  real i = real(0.5);
+  real i = from;
   if (i < count) {
     do {
-      take_sample(a, r, q0 + dq * i, interval);
+      take_sample(a, r, q0 + dq * i, interval, begin + ray_real(interval * (i - real(0.5))), begin + ray_real(interval * i));
       i += real(1);
-    } while (i < count && !ray_ended(a));
+    } while (i < count && !ray_stopped(a));
   }
+  return i - real(1);
 }
 
-void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a) {
+void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
   vec3r direction = vec3r(ray.direction);
   vec3r inverse = safe_inverse(direction);
-  ray_real t = ray_real(0);
-  Position p = make_position(ray.entry);
+  ray_real t = front.t;
+  Position p = front.p;
+  real part = front.part;
   bool more = true;
   do {
     Region r;
@@ -308,6 +300,8 @@ void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a) {
     bool skipped = true;
     do {  // the next region that can be seen: all lanes of a SIMD group then sample together
       bool inside = locate(p, r);
+      front.t = t;
+      front.p = p;
       f = vec3r(p.cell - r.lower) + p.fraction;
       vec3r exits = max(-f * inverse, (vec3r(r.upper - r.lower) - f) * inverse);
       length = max(min(exits.x, min(exits.y, exits.z)), real(0));
@@ -316,20 +310,56 @@ void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a) {
       if (!more) length = real(max(ray.length - t, ray_real(0)));
       skipped = !inside || region_invisible(a, r);
       count_region(a, skipped);
+      if (skipped) pass_region(a, inside, r, next);
       t = next;
       bool x = exits.x <= min(exits.y, exits.z);
       bool y = !x && exits.y <= exits.z;
       p = leave_region(ray, r, t, bvec3(x, y, !x && !y));
       more = more && all(greaterThanEqual(p.cell, ivec3(0))) && all(lessThan(p.cell, u_domain_cells));
     } while (skipped && more);
-    if (!skipped && length > real(0)) march_adaptive_region(a, r, f, direction, length);
-  } while (more && !ray_ended(a));
+    if (!skipped && length > real(0)) front.part = march_adaptive_region(a, r, f, direction, length, front.t, part);
+    part = real(0.5);
+  } while (more && !ray_stopped(a));
+}
+
+void march(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
+  if (AMRTEX_LATTICE != 0) march_lattice(ray, a, front);
+  else march_adaptive(ray, a, front);
+}
+
+#if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
+// The loop over samples stops at each surface, so that none of what a surface costs (bisection,
+// gradient) is inside of it.
+void march_surfaces(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
+  bool more = true;
+  do {
+    march(ray, a, front);
+    more = a.crossing;
+    if (a.crossing) draw_surface(ray, a);
+    more = more && !surfaces_ended(a) && !ray_ended(a);
+  } while (more);
+}
+#endif
+
+// The picture's value for a ray that misses the drawn box.
+vec4r missed_picture() {
+  return vec4r(real(0), real(0), real(0), real(AMRTEX_MODE == AMRTEX_MODE_PROJECTION || AMRTEX_MODE == AMRTEX_MODE_MIP ? 1 : 0));
 }
 
 // The picture's value for one ray: premultiplied RGBA, or (value, 0, 0, 1).
 vec4r march_ray(IN(Ray) ray, INOUT(Accumulation) a) {
-  if (AMRTEX_LATTICE != 0) march_lattice(ray, a);
-  else march_adaptive(ray, a);
+  Front front;
+  front.next = 0;
+  front.t = ray_real(0);
+  front.p = make_position(ray.entry);
+  front.part = real(0.5);
+#if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
+  if (AMRTEX_ISOVALUES != 0) {
+    march_surfaces(ray, a, front);
+    return surface_picture(a);
+  }
+#endif
+  march(ray, a, front);
   if (AMRTEX_MODE == AMRTEX_MODE_DVR) return vec4r(a.color, real(1) - a.transmittance);
   if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION) return vec4r(a.sum * u_length_unit, real(0), real(0), real(1));
   return vec4r(a.maximum < real(-2.9e38) ? real(0) : a.maximum, real(0), real(0), real(1));

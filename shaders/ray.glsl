@@ -10,11 +10,13 @@ UNIFORM(ray_vec3, u_cells_per_unit)  // finest cells a unit; (1, 1, 1) for cubic
 UNIFORM(ray_vec3, u_draw_lower)      // finest: the domain, or the sub-box to draw
 UNIFORM(ray_vec3, u_draw_upper)      // finest
 UNIFORM(vec2r, u_picture_size)       // pixels
+UNIFORM(real, u_length_unit)         // world length of one unit of ray length
 
 STRUCT Ray {
   ray_vec3 entry;      // finest: where it enters the drawn box, or the eye inside it
   ray_vec3 direction;  // finest cells a unit of length
   ray_real length;     // units, from entry to exit
+  ray_real start;      // units, from where the camera sends it to the entry
 };
 
 // False when the pixel's ray misses the box. `pixel`: centre, from the lower left.
@@ -31,6 +33,7 @@ bool camera_ray(IN(vec2r) pixel, OUT(Ray) ray) {
   ray_real leave = ray_real(1e30);
   ray.entry = origin;
   ray.length = ray_real(0);
+  ray.start = ray_real(0);
   for (int axis = 0; axis < 3; ++axis) {
     ray_real o = origin[axis];
     ray_real d = ray.direction[axis];
@@ -46,6 +49,7 @@ bool camera_ray(IN(vec2r) pixel, OUT(Ray) ray) {
   if (!(leave > enter)) return false;
   ray.entry = clamp(origin + ray.direction * enter, u_draw_lower, u_draw_upper);
   ray.length = leave - enter;
+  ray.start = enter;
   return true;
 }
 

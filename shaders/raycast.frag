@@ -3,6 +3,8 @@
 #include "contract.glsl"
 #include "ray.glsl"
 #include "transfer_function.glsl"
+#include "accumulate.glsl"
+#include "isosurface.glsl"
 #include "march.glsl"
 
 layout(location = 0) out vec4 out_color;
@@ -13,10 +15,9 @@ layout(location = 1) out uvec4 out_counted;
 void main() {
   Accumulation a = empty_accumulation();
   Ray ray;
-  vec4 color = vec4(0);
+  vec4 color = missed_picture();
   bool met = camera_ray(gl_FragCoord.xy, ray);
   if (met) color = march_ray(ray, a);
-  else if (AMRTEX_MODE != AMRTEX_MODE_DVR) color.w = 1.0;
   out_color = color;
 #if AMRTEX_COUNT
   out_counted = uvec4(uvec3(a.counted), met ? 1u : 0u);

@@ -480,15 +480,16 @@ void read_levels(const fs::path& path, const PlotHeader& header, const std::vect
   }
 }
 
-/// Components to read: the field's, or all.
+/// Components to read: those of the fields, or all.
 std::vector<std::size_t> wanted_components(const fs::path& path, const PlotHeader& header,
-                                           const std::optional<std::string>& field) {
+                                           const std::vector<std::string>& fields) {
   std::vector<std::size_t> wanted;
-  for (std::size_t i = 0; i < header.fields.size(); ++i)
-    if (!field || header.fields[i] == *field) wanted.push_back(i);
-  if (wanted.empty())
-    throw UsageError(fmt::format("{}: no field '{}'; its fields are {}", path.string(), *field, fmt::join(header.fields, ", ")));
-  if (field) wanted.resize(1);
+  for (const std::string& field : fields.empty() ? header.fields : fields) {
+    const auto found = std::find(header.fields.begin(), header.fields.end(), field);
+    if (found == header.fields.end())
+      throw UsageError(fmt::format("{}: no field '{}'; its fields are {}", path.string(), field, fmt::join(header.fields, ", ")));
+    wanted.push_back(static_cast<std::size_t>(found - header.fields.begin()));
+  }
   return wanted;
 }
 
@@ -657,9 +658,9 @@ bool is_amrex_plotfile(const fs::path& path) {
   return fs::is_regular_file(path / "Header", ignored) || fs::is_directory(path / "Level_0", ignored);
 }
 
-MeshDescription read_amrex_plotfile(const fs::path& path, const std::optional<std::string>& field) {
+MeshDescription read_amrex_plotfile(const fs::path& path, const std::vector<std::string>& fields) {
   const PlotHeader header = scan_header(path);
-  const std::vector<std::size_t> wanted = wanted_components(path, header, field);
+  const std::vector<std::size_t> wanted = wanted_components(path, header, fields);
   std::vector<LevelSources> sources;
   for (std::size_t level = 0; level < header.levels.size(); ++level) sources.push_back(locate_level(header, level));
   check_memory(path, sources, wanted.size());

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <string>
+#include <vector>
 
 #include "amr_hierarchy.hpp"
 
@@ -12,8 +12,8 @@ namespace amrtex {
 /// True when the folder looks like a plotfile.
 bool is_amrex_plotfile(const std::filesystem::path& path);
 
-/// Reads one field, or all when none is given.
-MeshDescription read_amrex_plotfile(const std::filesystem::path& path, const std::optional<std::string>& field);
+/// Reads these fields, or all when none is given.
+MeshDescription read_amrex_plotfile(const std::filesystem::path& path, const std::vector<std::string>& fields);
 
 /// Writes float64 FABs, little endian, Cell_H version 1, one data file a level, into
 /// a folder that must not exist yet; nothing is left behind on failure.

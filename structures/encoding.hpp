@@ -54,6 +54,8 @@ struct SceneNeeds {
   Filter filter = Filter::nearest;
   Filtering filtering = Filtering::manual;
   bool value_ranges = true;  ///< regions are skipped by their value range
+  bool gradients = false;    ///< surfaces are lit: stored gradients are of use where an encoding has room for them
+  bool operator==(const SceneNeeds&) const = default;
 };
 
 struct LeftOut {
@@ -102,6 +104,7 @@ struct EncodedField {
 
 struct BuildRequest {
   int field = 0;
+  std::vector<int> more_fields;  ///< fetched beside `field`, at the same places
   Storage storage = Storage::r32f;
   SceneNeeds needs;
   Json parameters = Json::object();                                      ///< unknown keys are an error

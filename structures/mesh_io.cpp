@@ -10,7 +10,7 @@ namespace {
 struct Format {
   const char* name;  ///< for messages
   bool (*probe)(const std::filesystem::path& path);
-  MeshDescription (*read)(const std::filesystem::path& path, const std::optional<std::string>& field);
+  MeshDescription (*read)(const std::filesystem::path& path, const std::vector<std::string>& fields);
 };
 
 /// One line a format; the first whose probe says yes reads.
@@ -26,11 +26,11 @@ std::string known_formats() {
 
 }  // namespace
 
-MeshDescription read_mesh(const std::filesystem::path& path, const std::optional<std::string>& field) {
+MeshDescription read_mesh(const std::filesystem::path& path, const std::vector<std::string>& fields) {
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored)) throw Error(fmt::format("{}: no such file or folder", path.string()));
   for (const Format& format : kFormats)
-    if (format.probe(path)) return format.read(path, field);
+    if (format.probe(path)) return format.read(path, fields);
   throw Error(fmt::format("{}: not in a format that can be read: {}", path.string(), known_formats()));
 }
 

@@ -182,7 +182,9 @@ BlockTree make_tree(const MeshKeys& keys, const RefineCriterion& criterion, Bloc
 /// Computes the values of blocks.
 class ValueSource {
  public:
-  ValueSource(const MeshKeys& keys, const AnalyticField& field) : keys_(keys), field_(field) {}
+  /// `index` of the field among the mesh's: each has its own missing values.
+  ValueSource(const MeshKeys& keys, const AnalyticField& field, std::size_t index)
+      : keys_(keys), field_(field), missing_seed_(keys.seed + index) {}
 
   std::vector<double> values(int level, const Vec3i& block) const {
     const Box box = keys_.grid.box(level, block);
@@ -219,22 +221,52 @@ class ValueSource {
 
   void remove_values(int level, const Box& box, std::vector<double>& values) const {
     for_each_cell(box, [&](const Vec3i& cell) {
-      if (cell_random(keys_.seed, kMissingStream, level, cell) < keys_.nan_fraction)
+      if (cell_random(missing_seed_, kMissingStream, level, cell) < keys_.nan_fraction)
         values[box.offset(cell)] = std::numeric_limits<double>::quiet_NaN();
     });
   }
 
   const MeshKeys& keys_;
   const AnalyticField& field_;
+  std::uint64_t missing_seed_;
 };
 
-std::vector<Patch> make_patches(const MeshKeys& keys, const BlockTree& tree, const AnalyticField& field, int level) {
+/// The fields of a mesh with their names; the mesh is refined by the first.
+struct NamedFields {
+  std::vector<std::unique_ptr<AnalyticField>> fields;
+  std::vector<std::string> names;
+
+  void add(const Json& specification) {
+    fields.push_back(make_analytic_field(specification));
+    std::string name = analytic_field_type(specification);
+    for (int i = 2; std::find(names.begin(), names.end(), name) != names.end(); ++i)
+      name = fmt::format("{}_{}", analytic_field_type(specification), i);
+    names.push_back(std::move(name));
+  }
+};
+
+NamedFields read_fields(SpecReader& reader, const Json& specification) {
+  NamedFields fields;
+  reader.find("field");
+  fields.add(specification);
+  const Json* more = reader.find("more_fields");
+  if (more == nullptr) return fields;
+  if (!more->is_array()) reader.refuse("more_fields", "a list of fields, each a type or an object with a type");
+  for (const Json& field : *more) {
+    Json other = specification;
+    other["field"] = field;
+    fields.add(other);
+  }
+  return fields;
+}
+
+std::vector<Patch> make_patches(const MeshKeys& keys, const BlockTree& tree, const NamedFields& fields, int level) {
   const BlockList& blocks = tree.levels[static_cast<std::size_t>(level)];
-  const ValueSource source(keys, field);
   std::vector<Patch> patches(blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
     patches[i].box = keys.grid.box(level, blocks[i]);
-    patches[i].values.push_back(source.values(level, blocks[i]));
+    for (std::size_t f = 0; f < fields.fields.size(); ++f)
+      patches[i].values.push_back(ValueSource(keys, *fields.fields[f], f).values(level, blocks[i]));
   });
   return patches;
 }
@@ -243,11 +275,9 @@ std::vector<Patch> make_patches(const MeshKeys& keys, const BlockTree& tree, con
 
 MeshDescription generate_mesh(const Json& specification) {
   SpecReader reader(specification, "");
-  reader.find("field");
-  const std::unique_ptr<AnalyticField> field = make_analytic_field(specification);
-  const std::string field_type = analytic_field_type(specification);
-  const MeshKeys keys = read_mesh_keys(reader, field_type);
-  const auto criterion = read_criterion(reader, keys.grid, keys.domain, *field, keys.seed);
+  const NamedFields fields = read_fields(reader, specification);
+  const MeshKeys keys = read_mesh_keys(reader, fields.names.front());
+  const auto criterion = read_criterion(reader, keys.grid, keys.domain, *fields.fields.front(), keys.seed);
   reader.finish();
 
   const BlockTree tree = make_tree(keys, *criterion, root_blocks(keys, reader));
@@ -257,10 +287,10 @@ MeshDescription generate_mesh(const Json& specification) {
   mesh.domain_upper = keys.domain.upper;
   mesh.root_cells = keys.grid.root_cells;
   mesh.ratios = keys.grid.ratios;
-  mesh.fields = {field_type};
+  mesh.fields = fields.names;
   for (int level = 0; level < keys.grid.level_count(); ++level) {
     const bool empty = keys.rules.skipped[static_cast<std::size_t>(level)];
-    mesh.levels.push_back(empty ? std::vector<Patch>() : make_patches(keys, tree, *field, level));
+    mesh.levels.push_back(empty ? std::vector<Patch>() : make_patches(keys, tree, fields, level));
   }
   return mesh;
 }

@@ -280,7 +280,7 @@ void expect_points(const AmrHierarchy& mesh, const Json& samples) {
 
 void expect_oracle(const fs::path& data, const fs::path& oracle_path) {
   const Json oracle = Json::parse(read_text(oracle_path));
-  const AmrHierarchy mesh(read_mesh(data, "phi"));
+  const AmrHierarchy mesh(read_mesh(data, {"phi"}));
   expect_levels(mesh, oracle);
   expect_statistics(mesh, only_field(oracle));
   expect_points(mesh, oracle.at("point_samples").at("samples"));
@@ -369,8 +369,8 @@ TEST_F(AmrexReader, ReadsOnlyTheFieldAskedFor) {
   Spec spec = two_levels();
   spec.fields = {"density", "velocity in x", "Y(O2)"};
   expect_round(folder_ / "plt", spec);
-  expect_spec(read_mesh(folder_ / "plt", "velocity in x"), spec, {1});
-  expect_spec(read_mesh(folder_ / "plt", "Y(O2)"), spec, {2});
+  expect_spec(read_mesh(folder_ / "plt", {"velocity in x"}), spec, {1});
+  expect_spec(read_mesh(folder_ / "plt", {"Y(O2)"}), spec, {2});
 }
 
 TEST_F(AmrexReader, TakesRatiosFromTheDomains) {
@@ -629,7 +629,7 @@ TEST_F(AmrexReader, NamesTheFieldsThereAre) {
   Spec spec = two_levels();
   spec.fields = {"density", "velocity in x"};
   write_plotfile(folder_ / "plt", spec);
-  const std::string message = message_of<UsageError>([&] { read_mesh(folder_ / "plt", "phi"); });
+  const std::string message = message_of<UsageError>([&] { read_mesh(folder_ / "plt", {"phi"}); });
   EXPECT_NE(message.find("no field 'phi'; its fields are density, velocity in x"), std::string::npos) << message;
   EXPECT_NE(message.find("plt"), std::string::npos) << message;
 }

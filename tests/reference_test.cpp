@@ -788,7 +788,7 @@ void check_oracle(const fs::path& data, const fs::path& oracle_file) {
   const Json oracle = Json::parse(std::ifstream(oracle_file));
   for (const auto* key : {"ortho_rays", "point_samples"}) {
     if (!oracle.contains(key)) continue;
-    const AmrHierarchy h(read_mesh(data, field_name(oracle[key]["field"].get<std::string>())));
+    const AmrHierarchy h(read_mesh(data, {field_name(oracle[key]["field"].get<std::string>())}));
     if (key == std::string("ortho_rays"))
       check_rays(h, oracle[key]["rays"]);
     else

@@ -1,0 +1,191 @@
+// Isosurfaces on the sampler contract: where a ray crosses one, and what it adds to the picture.
+// A hit is a change of side of f - isovalue between consecutive samples that both have a value,
+// across regions too. Entering or leaving the mesh is none.
+#if !AMRTEX_CPP
+#ifndef AMRTEX_ISOVALUES
+#error AMRTEX_ISOVALUES must be defined: how many isosurfaces are drawn; 0 leaves out what they need
+#endif
+#if AMRTEX_ISOVALUES > 0
+#ifndef AMRTEX_OUTPUT
+#error AMRTEX_OUTPUT must be defined: one of the AMRTEX_OUTPUT_... below
+#endif
+#ifndef AMRTEX_SHADING
+#error AMRTEX_SHADING must be defined: 1 where surfaces are lit by their gradient, else 0
+#endif
+#endif
+#endif
+DEFINE_INT(AMRTEX_ISOVALUES)
+DEFINE_INT(AMRTEX_OUTPUT)
+DEFINE_INT(AMRTEX_SHADING)
+
+// the same numbers as enum class Output (renderers/scene.hpp)
+#define AMRTEX_OUTPUT_COLOR 0
+#define AMRTEX_OUTPUT_DEPTH 1
+#define AMRTEX_OUTPUT_NORMAL 2
+
+#if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
+UNIFORM_ARRAY(real, u_isovalues, AMRTEX_ISOVALUES, 16)           // ascending
+UNIFORM_ARRAY(real, u_surface_light, 4 * AMRTEX_ISOVALUES, 64)  // rgb, optical depth of each
+UNIFORM(real, u_surface_ambient)                                // light on a surface along the ray
+UNIFORM(int, u_bisections)                                      // of the interval between two samples
+
+// How many isovalues are at or below a value: the one number that says on which side of each it is.
+int isovalues_below(IN(real) value) {
+  int count = 0;
+  for (int i = 0; i < AMRTEX_ISOVALUES; ++i) count += value >= u_isovalues[i] ? 1 : 0;
+  return count;
+}
+
+// Does a whole range lie on the side on which the ray is? A ray without a side takes any.
+bool on_one_side(IN(Accumulation) a, IN(vec2r) value_range) {
+  int lower = isovalues_below(value_range.x);
+  return lower == isovalues_below(value_range.y) && (a.below < 0 || a.below == lower);
+}
+
+// Takes the side of a sample at `at`, whose interval begins at `begin`; or notes that a surface lies before it.
+void note_side(INOUT(Accumulation) a, IN(bool) missing, IN(real) value, IN(ray_real) begin, IN(ray_real) at) {
+  int below = missing ? -1 : isovalues_below(value);
+  a.crossing = a.below >= 0 && below >= 0 && a.below != below;
+  a.beyond = below;
+  a.after = at;
+  a.between = begin;
+  if (a.crossing) return;
+  a.below = below;
+  a.before = at;
+}
+
+// The first crossing of an isovalue between two samples.
+STRUCT Crossing {
+  bool found;         // false: one end has no value after all
+  ray_real t;         // units of ray length
+  real value_before;  // of f at the two ends
+  real value_after;
+};
+
+// Bisection through sample_field, then one secant: for a jump of f the last bracket, for a
+// smooth f far better.
+Crossing find_crossing(IN(Ray) ray, IN(Accumulation) a, IN(real) isovalue, IN(bool) rising) {
+  Crossing c;
+  FieldSample s;
+  ray_real from = a.before;
+  ray_real to = a.after;
+  c.found = sample_field(make_position(ray.entry + ray.direction * from), s);
+  c.value_before = s.value;
+  c.found = sample_field(make_position(ray.entry + ray.direction * to), s) && c.found;
+  c.value_after = s.value;
+  real low = c.value_before;
+  real high = c.value_after;
+  for (int i = 0; i < u_bisections; ++i) {
+    ray_real middle = (from + to) * ray_real(0.5);
+    bool beyond = sample_field(make_position(ray.entry + ray.direction * middle), s) && (s.value >= isovalue) == rising;
+    from = beyond ? from : middle;
+    low = beyond ? low : s.value;
+    to = beyond ? middle : to;
+    high = beyond ? s.value : high;
+  }
+  real rise = high - low;
+  real part = rise == real(0) || is_no_value(rise) ? real(0.5) : clamp((isovalue - low) / rise, real(0), real(1));
+  c.t = from + (to - from) * ray_real(part);
+  return c;
+}
+
+// Gradient at p, per unit of ray length along each axis: central differences over the width of
+// one cell of the region that holds p. A side without a value is left out.
+vec3r surface_gradient(IN(Position) p, IN(real) value) {
+  vec3r gradient = vec3r(0);
+  Region r;
+  if (!locate(p, r)) return gradient;
+  for (int axis = 0; axis < 3; ++axis) {
+    ivec3 way = ivec3(axis == 0 ? r.width : 0, axis == 1 ? r.width : 0, axis == 2 ? r.width : 0);
+    Position side = p;
+    FieldSample lower;
+    FieldSample upper;
+    side.cell = p.cell - way;
+    bool has_lower = sample_field(side, lower);
+    side.cell = p.cell + way;
+    bool has_upper = sample_field(side, upper);
+    real cells = real(r.width) * ((has_lower ? real(1) : real(0)) + (has_upper ? real(1) : real(0)));
+    real difference = (has_upper ? upper.value : value) - (has_lower ? lower.value : value);
+    gradient[axis] = cells > real(0) ? difference / cells * real(u_cells_per_unit[axis]) : real(0);
+  }
+  return gradient;
+}
+
+// Unit normal, along the gradient; 0 where there is no gradient.
+vec3r surface_normal(IN(Position) p, IN(real) value) {
+  vec3r gradient = surface_gradient(p, value);
+  // fields of any magnitude: the square of a gradient may be no float
+  real largest = max(abs(gradient.x), max(abs(gradient.y), abs(gradient.z)));
+  if (!(largest > real(0)) || largest > real(3e38)) return vec3r(0);
+  return normalize(gradient / largest);
+}
+
+// Light that comes back from a surface: a lamp at the eye, both sides alike (surface_light in renderers/scene.hpp).
+real reflected_light(IN(Ray) ray, IN(vec3r) normal) {
+  if (AMRTEX_SHADING == 0 || normal == vec3r(0)) return real(1);
+  vec3r direction = vec3r(ray.direction) / vec3r(u_cells_per_unit);
+  return u_surface_ambient + (real(1) - u_surface_ambient) * abs(dot(normal, direction));
+}
+
+// Adds an interval of the volume, or with a negative length takes back what lies behind a surface.
+void shift_volume(INOUT(Accumulation) a, IN(real) value, IN(real) length) {
+  vec4r light = transfer(value);
+  PRECISE real depth = light.w * length;
+  if (!(abs(depth) < real(30))) return;  // opaque: nothing of it shows
+  add_compensated(a, depth);
+  real transmittance = exp(-a.sum);
+  a.color += vec3r(light.x, light.y, light.z) * (a.transmittance - transmittance);
+  a.transmittance = transmittance;
+}
+
+vec3r surface_color(IN(Position) p, IN(int) k) {
+  return vec3r(u_surface_light[4 * k], u_surface_light[4 * k + 1], u_surface_light[4 * k + 2]);
+}
+
+void composite_surface(IN(Ray) ray, INOUT(Accumulation) a, IN(Position) p, IN(int) k) {
+  FieldSample s;
+  bool found = sample_field(p, s);
+  vec3r normal = vec3r(0);
+  if (AMRTEX_SHADING != 0) normal = surface_normal(p, found ? s.value : u_isovalues[k]);
+  vec3r rgb = surface_color(p, k) * reflected_light(ray, normal);
+  add_compensated(a, u_surface_light[4 * k + 3]);
+  real transmittance = min(exp(-a.sum), a.transmittance);
+  a.color += rgb * (a.transmittance - transmittance);
+  a.transmittance = transmittance;
+}
+
+// The surface between the last sample and the next: of the isovalue that is crossed first.
+void draw_surface(IN(Ray) ray, INOUT(Accumulation) a) {
+  bool rising = a.beyond > a.below;
+  int k = rising ? a.below : a.below - 1;
+  Crossing c = find_crossing(ray, a, u_isovalues[k], rising);
+  a.crossing = false;
+  a.below = c.found ? a.below + (rising ? 1 : -1) : -1;
+  if (!c.found) return;
+  Position p = make_position(ray.entry + ray.direction * c.t);
+  if (AMRTEX_OUTPUT == AMRTEX_OUTPUT_DEPTH) a.surface = vec4r(real(ray.start + c.t) * u_length_unit, real(0), real(0), real(1));
+  if (AMRTEX_OUTPUT == AMRTEX_OUTPUT_NORMAL) {
+    FieldSample s;
+    bool found = sample_field(p, s);
+    a.surface = vec4r(surface_normal(p, found ? s.value : u_isovalues[k]), real(1));
+  }
+  if (AMRTEX_OUTPUT != AMRTEX_OUTPUT_COLOR) return;
+  // the part of an interval between its end and the surface is moved to the other side of it
+  real shift = real(c.t - a.between);
+  real value = shift > real(0) ? c.value_after : c.value_before;
+  if (AMRTEX_DRAWS_VOLUME) shift_volume(a, value, shift);
+  composite_surface(ray, a, p, k);
+  if (AMRTEX_DRAWS_VOLUME) shift_volume(a, value, -shift);
+}
+
+// An opaque surface ends a ray; pictures of depth and normals end at the first.
+bool surfaces_ended(IN(Accumulation) a) {
+  if (AMRTEX_OUTPUT != AMRTEX_OUTPUT_COLOR) return a.surface.w > real(0);
+  return !(a.transmittance > real(0));
+}
+
+vec4r surface_picture(IN(Accumulation) a) {
+  if (AMRTEX_OUTPUT == AMRTEX_OUTPUT_COLOR) return vec4r(a.color, real(1) - a.transmittance);
+  return a.surface;
+}
+#endif
