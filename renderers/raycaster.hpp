@@ -34,6 +34,7 @@ class Raycaster {
   /// Draws once more with the counting variant of the shader.
   WorkCounts count();
   const std::string& shader_hash() const { return program_.hash(); }
+  const Program& program() const { return program_; }
   bool transfer_exact() const { return bindings_.transfer_exact; }
 
  private:

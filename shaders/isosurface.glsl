@@ -90,13 +90,15 @@ Crossing find_crossing(IN(Ray) ray, IN(Accumulation) a, IN(real) isovalue, IN(bo
 }
 
 // Gradient at p, per unit of ray length along each axis: central differences over the width of
-// one cell of the region that holds p. A side without a value is left out.
+// one cell of the region that holds p. `nearest` has surfaces on faces alone: differences over
+// the finest cells see which face it is. A side without a value is left out.
 vec3r surface_gradient(IN(Position) p, IN(real) value) {
   vec3r gradient = vec3r(0);
   Region r;
   if (!locate(p, r)) return gradient;
+  int width = AMRTEX_FILTER == AMRTEX_FILTER_NEAREST ? 1 : r.width;
   for (int axis = 0; axis < 3; ++axis) {
-    ivec3 way = ivec3(axis == 0 ? r.width : 0, axis == 1 ? r.width : 0, axis == 2 ? r.width : 0);
+    ivec3 way = ivec3(axis == 0 ? width : 0, axis == 1 ? width : 0, axis == 2 ? width : 0);
     Position side = p;
     FieldSample lower;
     FieldSample upper;
@@ -104,7 +106,7 @@ vec3r surface_gradient(IN(Position) p, IN(real) value) {
     bool has_lower = sample_field(side, lower);
     side.cell = p.cell + way;
     bool has_upper = sample_field(side, upper);
-    real cells = real(r.width) * ((has_lower ? real(1) : real(0)) + (has_upper ? real(1) : real(0)));
+    real cells = real(width) * ((has_lower ? real(1) : real(0)) + (has_upper ? real(1) : real(0)));
     real difference = (has_upper ? upper.value : value) - (has_lower ? lower.value : value);
     gradient[axis] = cells > real(0) ? difference / cells * real(u_cells_per_unit[axis]) : real(0);
   }
