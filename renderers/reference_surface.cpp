@@ -48,7 +48,7 @@ const std::vector<Crossing>& SurfaceFinder::next(const PieceFunction& f, double 
     else if (isovalues_[i] > f.upper)
       enter(i, Side::below, 0);
     else
-      cross(f, i);
+      cross(f, to - from, i);
   }
   std::sort(crossings_.begin(), crossings_.end(), meets_before);
   return crossings_;
@@ -60,7 +60,7 @@ void SurfaceFinder::enter(std::size_t surface, Side side, double s) {
 }
 
 /// Between its extrema f is monotone: each such stretch lies on one side or has one root.
-void SurfaceFinder::cross(const PieceFunction& f, std::size_t surface) {
+void SurfaceFinder::cross(const PieceFunction& f, double length, std::size_t surface) {
   const Cubic g = f.minus(isovalues_[surface]);
   const double touch = touching(f);
   const auto height = [&](double s) { return std::abs(g(s)) <= touch ? 0 : g(s); };
@@ -71,7 +71,9 @@ void SurfaceFinder::cross(const PieceFunction& f, std::size_t surface) {
     const double b = i < n ? extrema[static_cast<std::size_t>(i)] : 1;
     const double first = height(a);
     const double last = height(b);
-    enter(surface, first < 0 || (first == 0 && last < 0) ? Side::below : Side::above, a);
+    // a stretch on the isovalue is a plateau, and above, unless rounding made it
+    if (first != 0 || last != 0 || (b - a) * length > joint_)
+      enter(surface, first < 0 || (first == 0 && last < 0) ? Side::below : Side::above, a);
     if (first * last < 0) enter(surface, last < 0 ? Side::below : Side::above, root_between(g, a, b));
     a = b;
   }

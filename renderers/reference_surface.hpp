@@ -21,8 +21,8 @@ struct Crossing {
 /// open stretch, so to touch an isovalue in one point is no crossing; f >= isovalue is above.
 class SurfaceFinder {
  public:
-  /// `isovalues` outlive the finder. Pieces at most `joint` apart (world) are adjacent; beyond
-  /// wider gaps, where there is no mesh, sides start anew.
+  /// `isovalues` outlive the finder. What is at most `joint` long (world) is rounding: pieces
+  /// that lie no further apart are adjacent; beyond wider gaps, where there is no mesh, sides start anew.
   SurfaceFinder(const std::vector<double>& isovalues, double joint)
       : isovalues_(isovalues), joint_(joint), sides_(isovalues.size(), Side::unknown) {}
 
@@ -32,7 +32,7 @@ class SurfaceFinder {
  private:
   enum class Side : std::uint8_t { unknown, below, above };
   void enter(std::size_t surface, Side side, double s);
-  void cross(const PieceFunction& f, std::size_t surface);
+  void cross(const PieceFunction& f, double length, std::size_t surface);
 
   const std::vector<double>& isovalues_;
   double joint_;

@@ -292,9 +292,12 @@ TEST(ReferenceIso, GradientTakesTheLevelOfTheUpperCellOnAFace) {
       step[a] = width;
       gradient[a] = (reference.sample(p + step).value() - reference.sample(p - step).value()) / (2 * width);
     }
-    for (const double sign : {1.0, -1.0}) {
-      const auto normal = draw(h, {Filter::nearest}, one_ray(p, {sign, 0, 0}, {3}, Output::normal));
-      EXPECT_NEAR(depth(h, {Filter::nearest}, one_ray(p, {sign, 0, 0}, {3})), 3, 1e-14);
+    // oblique rays reach the face by rounded sums, and must still lie on it
+    for (int k = 0; k < 40; ++k) {
+      const Vec3d direction((k % 2 == 0 ? 1 : -1) * (1 - 0.017 * k), 0.013 * k, -0.007 * k);
+      const Scene scene = one_ray(p, direction, {3}, Output::normal, 1.7);
+      const auto normal = draw(h, {Filter::nearest}, scene);
+      EXPECT_NEAR(depth(h, {Filter::nearest}, scene), 1.7, 1e-14);
       for (int a = 0; a < 3; ++a) EXPECT_NEAR(normal[static_cast<std::size_t>(a)], glm::normalize(gradient)[a], 1e-14);
     }
   }
@@ -547,6 +550,16 @@ TEST(ReferenceIso, ToTouchIsNoHit) {
       EXPECT_NEAR(depth(row({1, 2, 3}), {filter}, along_row({2}, sign)), 3, 1e-14);
       EXPECT_NEAR(surfaces_met(row({1, 2, 1.5}), {filter}, along_row({1.5}, sign)), 1, 1e-12);
     }
+}
+
+TEST(ReferenceIso, ToTouchUpToRoundingIsNoHit) {
+  // the middle cell's value again, where neither it nor the way there is a binary fraction
+  for (const double v : {0.1, 0.3, 0.7, 1e5 / 3, -0.6})
+    for (const double sign : {1.0, -1.0})
+      for (const double y : {0.01, 0.17, -0.23, 0.31, 0.4}) {
+        const AmrHierarchy h = row({v - 1.1, v - 0.3, v - 0.3, v, v - 0.7, v - 0.6, v - 1.3});
+        EXPECT_EQ(surfaces_met(h, {Filter::linear_lod}, one_ray(Vec3d(0.5), {sign, y, 0.1}, {v})), 0) << v << " " << y;
+      }
 }
 
 TEST(ReferenceIso, PlateausAtTheIsovalueAreAbove) {
