@@ -4,10 +4,15 @@
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <cmath>
+#include <map>
+#include <mutex>
 
 #include "renderers/reference_field.hpp"
+#include "renderers/reference_point.hpp"
+#include "renderers/reference_surface.hpp"
 #include "renderers/reference_tracer.hpp"
 
 namespace amrtex {
@@ -97,7 +102,13 @@ double line_maximum(ReferenceTracer& tracer, const IndexRay& ray, double end) {
   return std::isfinite(best) ? best : 0;
 }
 
-void draw_pixel(ReferenceTracer& tracer, const Drawing& drawing, int x, int y, Picture& picture) {
+/// What one thread draws with.
+struct Worker {
+  ReferenceTracer tracer;
+  std::optional<SurfacePainter> painter;  // where there are surfaces
+};
+
+void draw_pixel(Worker& worker, const Drawing& drawing, int x, int y, Picture& picture) {
   const WorldRay world = camera_ray(drawing.camera, x, y, picture.width, picture.height);
   IndexRay ray{(world.origin - drawing.domain_lower) * drawing.cells_a_length, world.direction * drawing.cells_a_length};
   const auto span = stretch_in(ray, drawing.lower, drawing.upper);
@@ -107,16 +118,17 @@ void draw_pixel(ReferenceTracer& tracer, const Drawing& drawing, int x, int y, P
   double* pixel = picture.pixel(x, y);
   switch (drawing.mode) {
     case Mode::dvr:
-      draw_light(tracer, ray, end, drawing, pixel);
+      draw_light(worker.tracer, ray, end, drawing, pixel);
       break;
     case Mode::projection:
-      *pixel = line_integral(tracer, ray, end, drawing.part);
+      *pixel = line_integral(worker.tracer, ray, end, drawing.part);
       break;
     case Mode::mip:
-      *pixel = line_maximum(tracer, ray, end);
+      *pixel = line_maximum(worker.tracer, ray, end);
       break;
     case Mode::iso:
     case Mode::dvr_iso:
+      worker.painter->draw(worker.tracer, ray, world.direction, span->from, end, pixel);
       break;
   }
 }
@@ -125,7 +137,8 @@ void check(const Scene& scene, double step) {
   if (!(step > 0)) throw Error(fmt::format("reference step {}: must be a positive number of cell widths", step));
   if (scene.settings.width < 1 || scene.settings.height < 1)
     throw Error(fmt::format("picture of {} x {} pixels: both must be at least 1", scene.settings.width, scene.settings.height));
-  if (scene.settings.mode == Mode::dvr) validate(scene.transfer_function);
+  if (scene.settings.draws_volume()) validate(scene.transfer_function);
+  if (scene.settings.draws_surfaces()) validate(scene.settings.isosurfaces);
 }
 
 double extinction_scale(const AmrHierarchy& h, const TransferFunction& tf) {
@@ -136,91 +149,36 @@ double extinction_scale(const AmrHierarchy& h, const TransferFunction& tf) {
 }  // namespace
 
 std::optional<FinestPosition> finest_position(const AmrHierarchy& hierarchy, const Vec3d& p_world) {
-  const Vec3i cells = hierarchy.cells(hierarchy.finest_level());
-  const Vec3d x = to_index(hierarchy, p_world);
-  FinestPosition p{};
-  for (int a = 0; a < 3; ++a) {
+  // asked in the world: a point at the domain's upper end may be rounded past it in cells
+  for (int a = 0; a < 3; ++a)
     if (!(p_world[a] >= hierarchy.domain_lower()[a] && p_world[a] <= hierarchy.domain_upper()[a])) return std::nullopt;
-    p.cell[a] = std::min(static_cast<int>(std::min(x[a], 2147483647.0)), cells[a] - 1);
-    p.fraction[a] = std::min(x[a] - p.cell[a], std::nextafter(1.0, 0.0));
-  }
-  return p;
+  return position_at(hierarchy, glm::min(to_index(hierarchy, p_world), Vec3d(hierarchy.cells(hierarchy.finest_level()))));
 }
 
 struct HierarchyReference::Data {
   ReferenceField field;
+  std::mutex mutex;
+  std::map<int, ReferenceField> color_fields;  // made when a scene first asks for them
 
-  double linear(int level, const FinestPosition& p) const;
-  double vertex(const ReferenceLeaf& leaf, const FinestPosition& p) const;
-  double basis(const FinestPosition& p) const;
+  const ReferenceField* color_field(const Scene& scene);
 };
 
-namespace {
-
-/// Place in a cell of a level, in its widths from its lower corner.
-Vec3d place_in_cell(const FinestPosition& p, int width) { return (Vec3d(p.cell % width) + p.fraction) / Vec3d(width); }
-
-struct DualPlace {
-  Vec3i lower;  // of the cells between whose centres the position lies
-  Vec3d q;      // from that cell's centre, cell widths
-};
-DualPlace dual_place(const FinestPosition& p, int width) {
-  DualPlace place{p.cell / width, place_in_cell(p, width)};
-  for (int a = 0; a < 3; ++a) {
-    const bool below = place.q[a] < 0.5;
-    place.lower[a] -= below ? 1 : 0;
-    place.q[a] += below ? 0.5 : -0.5;
-  }
-  return place;
-}
-
-}  // namespace
-
-double HierarchyReference::Data::linear(int level, const FinestPosition& p) const {
-  const DualPlace place = dual_place(p, field.width(level));
-  return Trilinear::through(field.dual_cell(level, place.lower).values)(place.q);
-}
-
-double HierarchyReference::Data::vertex(const ReferenceLeaf& leaf, const FinestPosition& p) const {
-  return Trilinear::through(field.leaf_vertices(leaf, nullptr))(place_in_cell(p, field.width(leaf.level)));
-}
-
-double HierarchyReference::Data::basis(const FinestPosition& p) const {
-  double numerator = 0;
-  double denominator = 0;
-  for (int level = 0; level < field.hierarchy().level_count(); ++level) {
-    const DualPlace place = dual_place(p, field.width(level));
-    const auto cell = field.basis_cell(level, place.lower);
-    numerator += Trilinear::through(cell.values)(place.q);
-    denominator += Trilinear::through(cell.weights)(place.q);
-    if (!cell.finer) break;
-  }
-  return numerator / denominator;
+/// The field that colours the scene's surfaces; null where the isovalue does.
+const ReferenceField* HierarchyReference::Data::color_field(const Scene& scene) {
+  const std::string& name = scene.settings.isosurfaces.color_field;
+  if (!scene.settings.draws_surfaces() || name.empty()) return nullptr;
+  const int index = field.hierarchy().field_index(name);
+  const std::lock_guard lock(mutex);
+  // while it waits for its own tasks this thread must not take up another picture, which would lock again
+  return tbb::this_task_arena::isolate(
+      [&] { return &color_fields.try_emplace(index, field.hierarchy(), index, field.definition()).first->second; });
 }
 
 HierarchyReference::HierarchyReference(const AmrHierarchy& hierarchy, int field, FilterDefinition definition)
-    : data_(new Data{ReferenceField(hierarchy, field, definition)}) {}
+    : data_(new Data{ReferenceField(hierarchy, field, definition), {}, {}}) {}
 HierarchyReference::~HierarchyReference() = default;
 
-std::optional<double> HierarchyReference::sample(const FinestPosition& p) const {
-  const AmrHierarchy& h = data_->field.hierarchy();
-  if (!h.domain(h.finest_level()).contains(p.cell)) return std::nullopt;
-  const ReferenceLeaf leaf = data_->field.find_leaf(p.cell);
-  if (leaf.level < 0 || std::isnan(leaf.value)) return std::nullopt;
-  switch (data_->field.definition().filter) {
-    case Filter::nearest:
-      return leaf.value;
-    case Filter::linear_lod:
-      return data_->linear(leaf.level, p);
-    case Filter::linear_page:
-      return data_->linear(data_->field.page_level(p.cell), p);
-    case Filter::linear_vertex:
-      return data_->vertex(leaf, p);
-    case Filter::basis:
-      return data_->basis(p);
-  }
-  return std::nullopt;
-}
+std::optional<double> HierarchyReference::sample(const FinestPosition& p) const { return value_at(data_->field, p, nullptr); }
 
 std::optional<double> HierarchyReference::sample(const Vec3d& p_world) const {
   const auto p = finest_position(data_->field.hierarchy(), p_world);
@@ -230,18 +188,25 @@ std::optional<double> HierarchyReference::sample(const Vec3d& p_world) const {
 Picture HierarchyReference::render(const Scene& scene, double step) const {
   check(scene, step);
   const AmrHierarchy& h = data_->field.hierarchy();
+  const ReferenceField* color_field = data_->color_field(scene);
   std::optional<TransferTable> table;
-  if (scene.settings.mode == Mode::dvr) table.emplace(scene.transfer_function, extinction_scale(h, scene.transfer_function));
+  if (scene.settings.draws_volume()) table.emplace(scene.transfer_function, extinction_scale(h, scene.transfer_function));
   const Drawing drawing = make_drawing(h, scene, step, table ? &*table : nullptr);
-  Picture picture(scene.settings.width, scene.settings.height, scene.settings.mode == Mode::dvr ? 4 : 1);
+  std::optional<SurfaceScene> surfaces;
+  if (scene.settings.draws_surfaces()) surfaces.emplace(scene, data_->field, color_field, drawing.table, drawing.part);
+  Picture picture(scene.settings.width, scene.settings.height, scene.settings.picture_channels());
   const int columns = ceil_div(picture.width, kTile);
-  tbb::enumerable_thread_specific<ReferenceTracer> tracers([&] { return ReferenceTracer(data_->field); });
+  tbb::enumerable_thread_specific<Worker> workers([&] {
+    Worker worker{ReferenceTracer(data_->field), std::nullopt};
+    if (surfaces) worker.painter.emplace(*surfaces);
+    return worker;
+  });
   tbb::parallel_for(0, columns * ceil_div(picture.height, kTile), [&](int tile) {
-    ReferenceTracer& tracer = tracers.local();
+    Worker& worker = workers.local();
     const int x0 = tile % columns * kTile;
     const int y0 = tile / columns * kTile;
     for (int y = y0; y < std::min(y0 + kTile, picture.height); ++y)
-      for (int x = x0; x < std::min(x0 + kTile, picture.width); ++x) draw_pixel(tracer, drawing, x, y, picture);
+      for (int x = x0; x < std::min(x0 + kTile, picture.width); ++x) draw_pixel(worker, drawing, x, y, picture);
   });
   return picture;
 }

@@ -33,8 +33,9 @@ class HierarchyReference {
   std::optional<double> sample(const Vec3d& p_world) const;
 
   /// Draws the scene: each ray is split wherever the filter is not smooth, pieces are
-  /// integrated in parts of at most `step` finest cell widths. Uses all cores.
-  /// Independent of the scene's step, sampling, skip and early_end.
+  /// integrated in parts of at most `step` finest cell widths; isosurfaces are roots on
+  /// the pieces and jumps between them. Uses all cores. Independent of the scene's step,
+  /// sampling, skip, early_end and tolerance.
   Picture render(const Scene& scene, double step) const;
 
  private:

@@ -10,23 +10,6 @@ constexpr double kSqrt3 = 1.7320508075688772935;
 constexpr double kParts = 16;   // of a piece, before only its opaque ones are split further
 constexpr double kThin = 0.25;  // optical depth of a part that is never split further
 
-/// Newton's method kept inside a bracket with a change of sign.
-double bracketed_root(const Cubic& f, double a, double b) {
-  const bool rising = f(a) < 0;
-  double s = (a + b) / 2;
-  for (int i = 0; i < 100 && b - a > 0; ++i) {
-    const double v = f(s);
-    if (v == 0) return s;
-    ((v < 0) == rising ? a : b) = s;
-    const double slope = f.c[1] + s * (2 * f.c[2] + s * 3 * f.c[3]);
-    double next = s - v / slope;
-    if (!(next > a && next < b)) next = (a + b) / 2;
-    if (std::abs(next - s) <= 1e-15) return next;
-    s = next;
-  }
-  return s;
-}
-
 /// Maximum of a cubic over [0, 1] and where.
 double argmax(const Cubic& f) {
   std::array<double, 2> inner{};
@@ -57,6 +40,23 @@ int extrema_in_unit(const Cubic& f, std::array<double, 2>& out) {
   return n;
 }
 
+/// Newton's method kept inside a bracket with a change of sign.
+double root_between(const Cubic& f, double a, double b) {
+  const bool rising = f(a) < 0;
+  double s = (a + b) / 2;
+  for (int i = 0; i < 100 && b - a > 0; ++i) {
+    const double v = f(s);
+    if (v == 0) return s;
+    ((v < 0) == rising ? a : b) = s;
+    const double slope = f.c[1] + s * (2 * f.c[2] + s * 3 * f.c[3]);
+    double next = s - v / slope;
+    if (!(next > a && next < b)) next = (a + b) / 2;
+    if (std::abs(next - s) <= 1e-15) return next;
+    s = next;
+  }
+  return s;
+}
+
 int roots_in_unit(const Cubic& f, std::array<double, 3>& out) {
   std::array<double, 2> inner{};
   const int m = extrema_in_unit(f, inner);
@@ -64,10 +64,19 @@ int roots_in_unit(const Cubic& f, std::array<double, 3>& out) {
   double a = 0;
   for (int i = 0; i <= m; ++i) {
     const double b = i < m ? inner[static_cast<std::size_t>(i)] : 1;
-    if ((f(a) < 0 && f(b) > 0) || (f(a) > 0 && f(b) < 0)) out[static_cast<std::size_t>(n++)] = bracketed_root(f, a, b);
+    if ((f(a) < 0 && f(b) > 0) || (f(a) > 0 && f(b) < 0)) out[static_cast<std::size_t>(n++)] = root_between(f, a, b);
     a = b;
   }
   return n;
+}
+
+Cubic PieceFunction::minus(double value) const {
+  Cubic difference = numerator;
+  if (rational)
+    for (std::size_t i = 0; i < 4; ++i) difference.c[i] -= value * denominator.c[i];
+  else
+    difference.c[0] -= value;
+  return difference;
 }
 
 double maximum(const PieceFunction& f) {
@@ -75,9 +84,7 @@ double maximum(const PieceFunction& f) {
   // Dinkelbach: the maximum of N / D is the m at which max(N - m D) = 0.
   double best = std::max(f(0), f(1));
   for (int i = 0; i < 50; ++i) {
-    Cubic shifted = f.numerator;
-    for (std::size_t k = 0; k < 4; ++k) shifted.c[k] -= best * f.denominator.c[k];
-    const double next = f(argmax(shifted));
+    const double next = f(argmax(f.minus(best)));
     if (!(next > best)) break;
     best = next;
   }
@@ -130,42 +137,45 @@ TransferTable::Light TransferTable::light(const Segment& segment, double value) 
   return {segment.lower.extinction + w * rise, segment.lower.rgb + w * (segment.upper.rgb - segment.lower.rgb)};
 }
 
-void LightIntegral::add(const PieceFunction& f, double length, double max_part) {
-  const std::size_t first = table_.segment_of(f.lower);
-  const std::size_t last = table_.segment_of(f.upper);
-  if (!table_.visible(first, last)) return;
+void LightIntegral::add(const PieceFunction& f, double length, double max_part, double from, double to) {
+  if (table_ == nullptr || !(to > from)) return;
+  const std::size_t first = table_->segment_of(f.lower);
+  const std::size_t last = table_->segment_of(f.upper);
+  if (!table_->visible(first, last)) return;
   if (first == last) {
-    add_interval(f, 0, 1, length, max_part);
+    add_interval(f, from, to, length, max_part);
     return;
   }
-  breaks_.assign({0.0, 1.0});
+  breaks_.assign({from, to});
   for (std::size_t k = first; k < last; ++k) {
-    Cubic difference = f.numerator;
-    if (f.rational)
-      for (std::size_t i = 0; i < 4; ++i) difference.c[i] -= table_.knots()[k] * f.denominator.c[i];
-    else
-      difference.c[0] -= table_.knots()[k];
     std::array<double, 3> roots{};
-    const int n = roots_in_unit(difference, roots);
-    breaks_.insert(breaks_.end(), roots.begin(), roots.begin() + n);
+    const int n = roots_in_unit(f.minus(table_->knots()[k]), roots);
+    for (int i = 0; i < n; ++i)
+      if (const double s = roots[static_cast<std::size_t>(i)]; s > from && s < to) breaks_.push_back(s);
   }
   std::sort(breaks_.begin(), breaks_.end());
   for (std::size_t i = 0; i + 1 < breaks_.size(); ++i)
     if (breaks_[i + 1] > breaks_[i]) add_interval(f, breaks_[i], breaks_[i + 1], length, max_part);
 }
 
+void LightIntegral::add_surface(const Vec3d& rgb, double opacity) {
+  color_ += transmittance_ * opacity * rgb;
+  transmittance_ *= 1 - opacity;
+  passed_ *= 1 - opacity;
+}
+
 /// Inside one segment of the transfer function everything is smooth: two Gauss points a part.
 void LightIntegral::add_interval(const PieceFunction& f, double from, double to, double length, double max_part) {
-  const auto& segment = table_.segment(table_.segment_of(f((from + to) / 2)));
+  const auto& segment = table_->segment(table_->segment_of(f((from + to) / 2)));
   if (!segment.visible) return;
   // two points integrate a cubic extinction exactly, and of one colour nothing else is needed
-  const bool exact = segment.constant || (segment.one_color && !table_.logarithmic() && !f.rational);
+  const bool exact = segment.constant || (segment.one_color && !table_->logarithmic() && !f.rational);
   const double wanted = exact ? 1 : std::ceil((to - from) * length / max_part * (1 - 1e-9));
   const int parts = static_cast<int>(std::clamp(wanted, 1.0, kParts));
   const double width = (to - from) / parts;
   for (int i = 0; i < parts; ++i)
     add_parts(f, segment, from + (i + 0.5) * width, width, length, exact ? std::numeric_limits<double>::infinity() : max_part);
-  transmittance_ = std::exp(-depth_);  // the product of the parts drifts
+  transmittance_ = passed_ * std::exp(-depth_);  // the product of the parts drifts
 }
 
 /// One part, or where it is longer than wanted its halves, as long as it is not thin: in a cell
@@ -174,8 +184,8 @@ void LightIntegral::add_parts(const PieceFunction& f, const TransferTable::Segme
                               double length, double max_part) {
   if (transmittance_ < kOpaque) return;
   const double offset = width / (2 * kSqrt3);
-  const auto first = table_.light(segment, f(middle - offset));
-  const auto second = table_.light(segment, f(middle + offset));
+  const auto first = table_->light(segment, f(middle - offset));
+  const auto second = table_->light(segment, f(middle + offset));
   const double depth = (first.extinction + second.extinction) / 2 * (width * length);
   if (width * length > max_part * 1.001 && depth > kThin) {
     add_parts(f, segment, middle - width / 4, width / 2, length, max_part);

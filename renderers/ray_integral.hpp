@@ -22,6 +22,8 @@ struct Cubic {
 int extrema_in_unit(const Cubic& f, std::array<double, 2>& out);
 /// The changes of sign of the cubic inside (0, 1), ascending; returns how many.
 int roots_in_unit(const Cubic& f, std::array<double, 3>& out);
+/// The change of sign in (a, b), at whose ends f has different signs.
+double root_between(const Cubic& f, double a, double b);
 
 /// f along a piece: numerator / denominator; the denominator is 1 for all filters but `basis`.
 struct PieceFunction {
@@ -31,6 +33,8 @@ struct PieceFunction {
   double lower = 0;  ///< bounds of f over the piece, not necessarily reached
   double upper = 0;
   double operator()(double s) const { return rational ? numerator(s) / denominator(s) : numerator(s); }
+  /// A cubic that has the sign of f - value all along the piece.
+  Cubic minus(double value) const;
 };
 
 /// Largest value of f over the piece.
@@ -71,17 +75,21 @@ class TransferTable {
   std::vector<int> visible_before_;  // visible segments below each
 };
 
-/// Emission and absorption along one ray, front to back: dC = T k c ds, dT = -T k ds.
+/// Emission and absorption along one ray, front to back: dC = T k c ds, dT = -T k ds; at a surface
+/// of opacity a, C grows by T a c and T falls to T (1 - a).
 class LightIntegral {
  public:
   /// Transmittance behind which nothing is added: far below what a float picture can show.
   static constexpr double kOpaque = 1e-12;
 
-  explicit LightIntegral(const TransferTable& table) : table_(table) {}
+  LightIntegral() = default;  ///< no volume, surfaces alone
+  explicit LightIntegral(const TransferTable& table) : table_(&table) {}
 
-  /// Adds a piece of `length`, in parts of at most `max_part` (both world), or of a 16th of
-  /// the piece where these are thin.
-  void add(const PieceFunction& f, double length, double max_part);
+  /// Adds a piece of `length`, or what lies between two of its places, in parts of at most
+  /// `max_part` (both world), or of a 16th of the stretch where these are thin.
+  void add(const PieceFunction& f, double length, double max_part, double from = 0, double to = 1);
+  /// Adds a surface behind all that was added before.
+  void add_surface(const Vec3d& rgb, double opacity);
 
   double transmittance() const { return transmittance_; }
   const Vec3d& color() const { return color_; }
@@ -92,9 +100,10 @@ class LightIntegral {
                  double max_part);
   void add_part(const TransferTable::Light& first, const TransferTable::Light& second, double depth);
 
-  const TransferTable& table_;
-  Vec3d color_{0};    // premultiplied
-  double depth_ = 0;  // optical, from the eye
+  const TransferTable* table_ = nullptr;
+  Vec3d color_{0};     // premultiplied
+  double depth_ = 0;   // optical, of the volume, from the eye
+  double passed_ = 1;  // what surfaces let through
   double transmittance_ = 1;
   std::vector<double> breaks_;
 };

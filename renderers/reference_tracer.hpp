@@ -21,7 +21,8 @@ class ReferenceTracer {
   explicit ReferenceTracer(const ReferenceField& field);
 
   /// Calls visit(f, from, to) for every piece with a value between t = 0 and `end`, front to
-  /// back, until it returns false. The ray is inside the domain all the way.
+  /// back, until it returns false. Adjacent pieces join to the bit: to = from. The ray is inside the
+  /// domain all the way.
   template <class Visit>
   void trace(const IndexRay& ray, double end, Visit&& visit) {
     start(ray);
@@ -33,6 +34,10 @@ class ReferenceTracer {
       if (!advance(exit)) return;
     }
   }
+
+  /// Where the piece being visited starts, finest space: exactly on the plane that it starts at.
+  const Vec3d& front() const { return position_; }
+  const Vec3d& domain() const { return domain_; }
 
  private:
   /// One trilinear function: between 8 cell centres, or between a leaf's vertices.

@@ -132,6 +132,8 @@ void add_surfaces(const Scene& scene, SceneBindings& b) {
   b.uniforms.push_back({"u_isovalues", iso.values});
   b.uniforms.push_back({"u_surface_light", light});
   b.uniforms.push_back({"u_surface_ambient", std::vector<double>{surface_light(0)}});
+  // no less than the quantum of positions can tell
+  b.uniforms.push_back({"u_face_distance", std::vector<double>{std::clamp(2 * iso.tolerance, 1.0 / 1024, 0.5)}});
   b.uniforms.push_back({"u_bisections", std::vector<int>{bisections(scene.settings)}});
   b.defines.emplace_back("AMRTEX_OUTPUT", static_cast<int>(iso.output));
   b.defines.emplace_back("AMRTEX_SHADING", iso.shading == Shading::gradient ? 1 : 0);

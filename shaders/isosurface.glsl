@@ -27,6 +27,7 @@ DEFINE_INT(AMRTEX_SHADING)
 UNIFORM_ARRAY(real, u_isovalues, AMRTEX_ISOVALUES, 16)           // ascending
 UNIFORM_ARRAY(real, u_surface_light, 4 * AMRTEX_ISOVALUES, 64)  // rgb, optical depth of each
 UNIFORM(real, u_surface_ambient)                                // light on a surface along the ray
+UNIFORM(real, u_face_distance)                                  // finest cells; see surface_gradient
 UNIFORM(int, u_bisections)                                      // of the interval between two samples
 
 // How many isovalues are at or below a value: the one number that says on which side of each it is.
@@ -89,26 +90,35 @@ Crossing find_crossing(IN(Ray) ray, IN(Accumulation) a, IN(real) isovalue, IN(bo
   return c;
 }
 
+// p moved along an axis by whole finest cells and by a part of one.
+Position moved(IN(Position) p, IN(int) axis, IN(int) cells, IN(real) part) {
+  Position to = p;
+  real fraction = p.fraction[axis] + part;
+  real whole = floor(fraction);
+  to.fraction[axis] = clamp(fraction - whole, real(0), real(AMRTEX_BELOW_ONE));
+  to.cell[axis] = p.cell[axis] + cells + int(whole);
+  return to;
+}
+
 // Gradient at p, per unit of ray length along each axis: central differences over the width of
-// one cell of the region that holds p. `nearest` has surfaces on faces alone: differences over
-// the finest cells see which face it is. A side without a value is left out.
+// one cell of the region that holds p. Surfaces of `nearest` are faces: a little more than what
+// a hit may be off its face, to either side, sees which. A side without a value is left out.
 vec3r surface_gradient(IN(Position) p, IN(real) value) {
   vec3r gradient = vec3r(0);
   Region r;
   if (!locate(p, r)) return gradient;
-  int width = AMRTEX_FILTER == AMRTEX_FILTER_NEAREST ? 1 : r.width;
+  bool faces = AMRTEX_FILTER == AMRTEX_FILTER_NEAREST;
+  int cells = faces ? 0 : r.width;
+  real part = faces ? u_face_distance : real(0);
+  real distance = faces ? u_face_distance : real(r.width);
   for (int axis = 0; axis < 3; ++axis) {
-    ivec3 way = ivec3(axis == 0 ? width : 0, axis == 1 ? width : 0, axis == 2 ? width : 0);
-    Position side = p;
     FieldSample lower;
     FieldSample upper;
-    side.cell = p.cell - way;
-    bool has_lower = sample_field(side, lower);
-    side.cell = p.cell + way;
-    bool has_upper = sample_field(side, upper);
-    real cells = real(width) * ((has_lower ? real(1) : real(0)) + (has_upper ? real(1) : real(0)));
+    bool has_lower = sample_field(moved(p, axis, -cells, -part), lower);
+    bool has_upper = sample_field(moved(p, axis, cells, part), upper);
+    real length = distance * ((has_lower ? real(1) : real(0)) + (has_upper ? real(1) : real(0)));
     real difference = (has_upper ? upper.value : value) - (has_lower ? lower.value : value);
-    gradient[axis] = cells > real(0) ? difference / cells * real(u_cells_per_unit[axis]) : real(0);
+    gradient[axis] = length > real(0) ? difference / length * real(u_cells_per_unit[axis]) : real(0);
   }
   return gradient;
 }

@@ -1,0 +1,143 @@
+#include "renderers/reference_surface.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "renderers/reference_point.hpp"
+
+namespace amrtex {
+namespace {
+
+// f this near to an isovalue at the end of a monotone stretch, relative to the values there, has reached it: what is
+// left is rounding, and must not make two crossings of a touch or a hit of a plateau
+constexpr double kTouch = 64 * std::numeric_limits<double>::epsilon();
+// gaps between pieces, relative to the ray's length in the mesh, that are rounding
+constexpr double kJoint = 1e-12;
+
+double touching(const PieceFunction& f) {
+  double scale = std::max(std::abs(f.lower), std::abs(f.upper));
+  if (f.rational) scale *= std::max(f.denominator(0), f.denominator(1));
+  return kTouch * scale;
+}
+
+/// At equal places values come in the order in which f passes them.
+bool meets_before(const Crossing& a, const Crossing& b) {
+  if (a.s != b.s) return a.s < b.s;
+  return a.rising ? a.surface < b.surface : a.surface > b.surface;
+}
+
+Vec3d unit(const Vec3d& v) {
+  const double size = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  return size > 0 ? glm::normalize(v / size) : Vec3d(0);  // scaled first: gradients in worlds of 1e200 work
+}
+
+/// A crossing's point in finest space; one on a face lies on it to the bit, so that it belongs to the upper cell.
+Vec3d point_of(const ReferenceTracer& tracer, const IndexRay& ray, double t, double s) {
+  return s == 0 ? tracer.front() : glm::clamp(ray.origin + t * ray.direction, Vec3d(0), tracer.domain());
+}
+
+}  // namespace
+
+const std::vector<Crossing>& SurfaceFinder::next(const PieceFunction& f, double from, double to) {
+  crossings_.clear();
+  if (from - end_ > joint_) std::fill(sides_.begin(), sides_.end(), Side::unknown);
+  end_ = to;
+  for (std::size_t i = 0; i < isovalues_.size(); ++i) {
+    if (isovalues_[i] <= f.lower)
+      enter(i, Side::above, 0);
+    else if (isovalues_[i] > f.upper)
+      enter(i, Side::below, 0);
+    else
+      cross(f, to - from, i);
+  }
+  std::sort(crossings_.begin(), crossings_.end(), meets_before);
+  return crossings_;
+}
+
+void SurfaceFinder::enter(std::size_t surface, Side side, double s) {
+  if (sides_[surface] != Side::unknown && sides_[surface] != side) crossings_.push_back({s, surface, side == Side::above});
+  sides_[surface] = side;
+}
+
+/// Between its extrema f is monotone: each such stretch lies on one side or has one root.
+void SurfaceFinder::cross(const PieceFunction& f, double length, std::size_t surface) {
+  const Cubic g = f.minus(isovalues_[surface]);
+  const double touch = touching(f);
+  const auto height = [&](double s) { return std::abs(g(s)) <= touch ? 0 : g(s); };
+  std::array<double, 2> extrema{};
+  const int n = extrema_in_unit(g, extrema);
+  double a = 0;
+  for (int i = 0; i <= n; ++i) {
+    const double b = i < n ? extrema[static_cast<std::size_t>(i)] : 1;
+    const double first = height(a);
+    const double last = height(b);
+    // a stretch on the isovalue is a plateau, and above, unless rounding made it
+    if (first != 0 || last != 0 || (b - a) * length > joint_)
+      enter(surface, first < 0 || (first == 0 && last < 0) ? Side::below : Side::above, a);
+    if (first * last < 0) enter(surface, last < 0 ? Side::below : Side::above, root_between(g, a, b));
+    a = b;
+  }
+}
+
+SurfaceScene::SurfaceScene(const Scene& s, const ReferenceField& f, const ReferenceField* color, const TransferTable* table,
+                           double largest_part)
+    : scene(s), settings(s.settings.isosurfaces), field(f), color_field(color), volume(table), part(largest_part) {
+  for (const double value : settings.values) rgb.push_back(surface_color(scene, value));
+}
+
+void SurfacePainter::draw(ReferenceTracer& tracer, const IndexRay& ray, const Vec3d& direction, double start, double end,
+                          double* pixel) {
+  if (scene_.settings.output == Output::color) return draw_color(tracer, ray, direction, end, pixel);
+  SurfaceFinder finder(scene_.settings.values, kJoint * end);
+  tracer.trace(ray, end, [&](const PieceFunction& f, double from, double to) {
+    const auto& crossings = finder.next(f, from, to);
+    if (crossings.empty()) return true;
+    const double s = crossings.front().s;
+    const double t = from + s * (to - from);
+    if (scene_.settings.output == Output::depth) {
+      *pixel = start + t;
+    } else {
+      const Vec3d normal = normal_at(point_of(tracer, ray, t, s));
+      for (int a = 0; a < 3; ++a) pixel[a] = normal[a];
+      pixel[3] = 1;
+    }
+    return false;
+  });
+}
+
+void SurfacePainter::draw_color(ReferenceTracer& tracer, const IndexRay& ray, const Vec3d& direction, double end, double* pixel) {
+  const Isosurfaces& surfaces = scene_.settings;
+  LightIntegral light = scene_.volume != nullptr ? LightIntegral(*scene_.volume) : LightIntegral();
+  SurfaceFinder finder(surfaces.values, kJoint * end);
+  tracer.trace(ray, end, [&](const PieceFunction& f, double from, double to) {
+    double behind = 0;  // the last crossing
+    for (const Crossing& c : finder.next(f, from, to)) {
+      light.add(f, to - from, scene_.part, behind, c.s);
+      behind = c.s;
+      if (light.transmittance() < LightIntegral::kOpaque) return false;
+      const Vec3d p = point_of(tracer, ray, from + c.s * (to - from), c.s);
+      light.add_surface(color_at(p, c.surface, direction), surfaces.opacity.empty() ? 1 : surfaces.opacity[c.surface]);
+    }
+    light.add(f, to - from, scene_.part, behind, 1);
+    return light.transmittance() >= LightIntegral::kOpaque;
+  });
+  for (int c = 0; c < 3; ++c) pixel[c] = light.color()[c];
+  pixel[3] = 1 - light.transmittance();
+}
+
+/// What the surface sends to the eye.
+Vec3d SurfacePainter::color_at(const Vec3d& p, std::size_t surface, const Vec3d& direction) {
+  Vec3d rgb = scene_.rgb[surface];
+  if (scene_.color_field != nullptr) {
+    const auto position = position_at(scene_.color_field->hierarchy(), p);
+    const auto value = position ? value_at(*scene_.color_field, *position, &color_vertices_) : std::nullopt;
+    if (value) rgb = surface_color(scene_.scene, *value);
+  }
+  if (scene_.settings.shading == Shading::none) return rgb;
+  const Vec3d normal = normal_at(p);
+  return normal == Vec3d(0) ? rgb : rgb * surface_light(glm::dot(normal, direction));
+}
+
+Vec3d SurfacePainter::normal_at(const Vec3d& p) { return unit(gradient_at(scene_.field, p, &vertices_).value_or(Vec3d(0))); }
+
+}  // namespace amrtex
