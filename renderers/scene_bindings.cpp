@@ -113,6 +113,16 @@ void add_camera(const AmrHierarchy& h, const Scene& scene, UniformValues& unifor
   uniforms.push_back({"u_picture_size", std::vector<double>{static_cast<double>(s.width), static_cast<double>(s.height)}});
 }
 
+/// a, b of each field.
+std::vector<double> value_scales(const EncodedField& field) {
+  std::vector<double> scales;
+  for (int i = 0; i < field.field_count; ++i) {
+    const StorageScale s = field.scale_of(i);
+    scales.insert(scales.end(), {s.offset, s.scale});
+  }
+  return scales;
+}
+
 }  // namespace
 
 UniformValues field_uniforms(const AmrHierarchy& h, const EncodedField& field) {
@@ -123,7 +133,7 @@ UniformValues field_uniforms(const AmrHierarchy& h, const EncodedField& field) {
   uniforms.push_back({"u_domain_cells", std::vector<int>{n.x, n.y, n.z}});
   uniforms.push_back({"u_level_width", widths});
   uniforms.push_back({"u_range_origin", std::vector<double>{field.range_origin}});
-  uniforms.push_back({"u_value_scale", std::vector<double>{field.scale.offset, field.scale.scale}});
+  uniforms.push_back({"u_value_scale", value_scales(field)});
   for (const auto& [name, v] : field.integer_uniforms) uniforms.push_back({name, std::vector<int>{v.x, v.y, v.z}});
   return uniforms;
 }
