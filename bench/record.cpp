@@ -310,7 +310,8 @@ Json memory_json(const EncodedField& field, std::int64_t leaf_cells) {
   Json texels = Json::object();
   for (const HostTexture& texture : field.textures) texels[texture.name] = texture.texels();
   Json per_cell = nullptr;
-  if (leaf_cells > 0) per_cell = static_cast<double>(field.value_texels()) / static_cast<double>(leaf_cells);
+  const std::int64_t values = leaf_cells * field.field_count;
+  if (values > 0) per_cell = static_cast<double>(field.value_texels()) / static_cast<double>(values);
   return {
       {"total_bytes", roles.total()},
       {"by_role",

@@ -25,7 +25,8 @@ class CpuField {
   /// declares and nobody provides. The texture's data must outlive this object.
   virtual void set(const std::vector<std::pair<std::string, int>>& defines, const UniformValues& uniforms,
                    const std::vector<const HostTexture*>& textures) = 0;
-  virtual ProbeResult sample(const Vec3i& finest_cell, const Vec3d& fraction) const = 0;
+  /// Field number `field`; throws UsageError where there are not so many.
+  virtual ProbeResult sample(const Vec3i& finest_cell, const Vec3d& fraction, int field = 0) const = 0;
   /// Ray of the pixel whose centre is (x, y) from the lower left, in pixels.
   virtual std::array<double, 4> trace(double x, double y) const = 0;
 };

@@ -22,12 +22,14 @@ class CpuShader final : public CpuField {
       if (auto it = shader_.bindings.resources.find(t->name); it != shader_.bindings.resources.end()) it->second->bind(*t);
   }
 
-  ProbeResult sample(const Vec3i& finest_cell, const Vec3d& fraction) const override {
+  ProbeResult sample(const Vec3i& finest_cell, const Vec3d& fraction, int field) const override {
+    if (field < 0 || field >= text().AMRTEX_FIELDS)
+      throw UsageError(fmt::format("no field number {}; the structure holds {}", field, text().AMRTEX_FIELDS));
     typename Shader::Position p;
     p.cell = finest_cell;
     p.fraction = glm::vec<3, real>(fraction);
     typename Shader::FieldSample s;
-    const bool found = text().sample_field(p, s);
+    const bool found = text().sample_value(p, field, s);
     return {found, static_cast<double>(s.value), s.level};
   }
 

@@ -15,7 +15,8 @@ GlBuffer upload(Context& context, const std::vector<T>& values) {
 }  // namespace
 
 std::vector<ProbeResult> probe_on_gl(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field,
-                                     const GpuField& gpu, std::span<const FinestPosition> points) {
+                                     const GpuField& gpu, std::span<const FinestPosition> points, int number) {
+  field.scale_of(number);  // refuses a number that the shader could not index
   if (points.empty()) return {};
   std::vector<glm::ivec4> cells;
   std::vector<glm::vec4> fractions;
@@ -25,7 +26,7 @@ std::vector<ProbeResult> probe_on_gl(Context& context, const AmrHierarchy& hiera
   }
   ShaderKey key;
   key.entry = "probe.comp";
-  key.use(field.shader).define("AMRTEX_RAY_DOUBLE", 0);
+  key.use(field.shader).define("AMRTEX_RAY_DOUBLE", 0).define("AMRTEX_PROBE_FIELD", number);
   Program program(context, assemble_shader(key));
   const GlBuffer cell_buffer = upload(context, cells);
   const GlBuffer fraction_buffer = upload(context, fractions);
@@ -49,13 +50,13 @@ std::vector<ProbeResult> probe_on_gl(Context& context, const AmrHierarchy& hiera
 }
 
 std::vector<ProbeResult> probe_on_cpu(const AmrHierarchy& hierarchy, const EncodedField& field, Precision precision,
-                                      std::span<const FinestPosition> points) {
+                                      std::span<const FinestPosition> points, int number) {
   const auto cpu = make_cpu_field(field.encoding, precision);
   std::vector<const HostTexture*> textures;
   for (const HostTexture& t : field.textures) textures.push_back(&t);
   cpu->set(field.shader.defines, field_uniforms(hierarchy, field), textures);
   std::vector<ProbeResult> results;
-  for (const FinestPosition& p : points) results.push_back(cpu->sample(p.cell, p.fraction));
+  for (const FinestPosition& p : points) results.push_back(cpu->sample(p.cell, p.fraction, number));
   return results;
 }
 

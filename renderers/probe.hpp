@@ -10,10 +10,11 @@
 
 namespace amrtex {
 
-/// The shader's positions: the fraction as float, so that GL and CPU see the same point.
+/// The shader's positions: the fraction as float, so that GL and CPU see the same point. `number`
+/// of the fields that the structure holds; throw UsageError where there are not so many.
 std::vector<ProbeResult> probe_on_gl(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field,
-                                     const GpuField& gpu, std::span<const FinestPosition> points);
+                                     const GpuField& gpu, std::span<const FinestPosition> points, int number = 0);
 std::vector<ProbeResult> probe_on_cpu(const AmrHierarchy& hierarchy, const EncodedField& field, Precision precision,
-                                      std::span<const FinestPosition> points);
+                                      std::span<const FinestPosition> points, int number = 0);
 
 }  // namespace amrtex

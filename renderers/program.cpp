@@ -166,9 +166,10 @@ void Program::list_uniforms() {
       uniforms_[name] = {location, static_cast<GLenum>(type), count, array};
       continue;
     }
-    if (array) fail(fmt::format("'{}' is an array of samplers; single samplers only", name));
-    gl.ProgramUniform1i(id(), location, static_cast<GLint>(unit));
-    samplers_[name] = {unit++};
+    for (int element = 0; element < count; ++element) {  // of an array, else one; their locations follow each other
+      gl.ProgramUniform1i(id(), location + element, static_cast<GLint>(unit));
+      samplers_[element_name(name, element)] = {unit++};
+    }
   }
   if (std::cmp_greater(unit, context_->info().max_texture_units))
     throw UnsupportedError(

@@ -61,6 +61,7 @@ class Program {
   bool set_optional(const UniformValue& value);
 
   bool has_uniform(std::string_view name) const { return uniforms_.contains(name); }
+  /// Elements of an array of samplers have names of their own: `name`, `name[1]`, ...
   bool has_sampler(std::string_view name) const { return samplers_.contains(name); }
   bool has_block(std::string_view name) const { return blocks_.contains(name); }
 

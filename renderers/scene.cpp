@@ -245,14 +245,17 @@ void validate(const Isosurfaces& iso) {
     throw UsageError(fmt::format("isosurfaces: 'iso_tolerance' is {}; it must lie in (0, 1] cell widths", iso.tolerance));
 }
 
-Vec3d surface_color(const Scene& scene, double value) {
+TransferFunction surface_colors(const Scene& scene) {
   TransferFunction map = scene.transfer_function;
   if (!scene.settings.isosurfaces.color.empty()) {
     map.color = scene.settings.isosurfaces.color;
     map.logarithmic = false;
   }
-  return map.color.empty() ? Vec3d(0.8) : map.color_at(value);
+  if (map.color.empty()) map.color = {{0, Vec3d(0.8)}};
+  return map;
 }
+
+Vec3d surface_color(const Scene& scene, double value) { return surface_colors(scene).color_at(value); }
 
 Sampling parse_sampling(std::string_view name) {
   for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive})

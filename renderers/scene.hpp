@@ -128,6 +128,8 @@ struct Scene {
   std::optional<std::array<Vec3d, 2>> region;  ///< sub-box to draw: lower and upper, world
 };
 
+/// Colours of surfaces: their own, or the transfer function's, or else one grey.
+TransferFunction surface_colors(const Scene& scene);
 /// Colour of a surface where the isovalue, or with a colour field its value there, is `value`.
 Vec3d surface_color(const Scene& scene, double value);
 /// Light that a surface reflects: `cosine` between its normal and the ray; 1 where it has no normal.

@@ -1,5 +1,7 @@
 #include "renderers/scene_bindings.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -30,6 +32,18 @@ bool needs_double_rays(const AmrHierarchy& h, const Scene& scene) {
   return std::max({n.x, n.y, n.z}) > kFloatRayCells || distance > 16 * glm::length(size) || narrow;
 }
 
+/// As u_color_points in transfer_function.glsl.
+std::vector<double> color_points(const TransferFunction& tf) {
+  std::vector<double> color{tf.axis(tf.color.front().value), 0, tf.color.front().rgb.x, tf.color.front().rgb.y,
+                            tf.color.front().rgb.z};
+  for (std::size_t i = 1; i < tf.color.size(); ++i) {
+    const double x = tf.axis(tf.color[i].value);
+    const Vec3d step = tf.color[i].rgb - tf.color[i - 1].rgb;
+    color.insert(color.end(), {x, 1 / (x - tf.axis(tf.color[i - 1].value)), step.x, step.y, step.z});
+  }
+  return color;
+}
+
 /// `unit`: multiplies extinction so that it is per unit of ray length.
 void add_points(const TransferFunction& tf, double unit, UniformValues& uniforms) {
   std::vector<double> extinction;
@@ -41,15 +55,8 @@ void add_points(const TransferFunction& tf, double unit, UniformValues& uniforms
       slope = (std::min(tf.extinction[i + 1].extinction * unit, 1e30) - kappa) / (tf.axis(tf.extinction[i + 1].value) - x);
     extinction.insert(extinction.end(), {x, kappa, slope});
   }
-  std::vector<double> color{tf.axis(tf.color.front().value), 0, tf.color.front().rgb.x, tf.color.front().rgb.y,
-                            tf.color.front().rgb.z};
-  for (std::size_t i = 1; i < tf.color.size(); ++i) {
-    const double x = tf.axis(tf.color[i].value);
-    const Vec3d step = tf.color[i].rgb - tf.color[i - 1].rgb;
-    color.insert(color.end(), {x, 1 / (x - tf.axis(tf.color[i - 1].value)), step.x, step.y, step.z});
-  }
   uniforms.push_back({"u_extinction_points", extinction});
-  uniforms.push_back({"u_color_points", color});
+  uniforms.push_back({"u_color_points", color_points(tf)});
 }
 
 void add_table(const TransferFunction& tf, double unit, SceneBindings& b) {
@@ -135,12 +142,30 @@ void add_surfaces(const Scene& scene, SceneBindings& b) {
   // no less than the quantum of positions can tell
   b.uniforms.push_back({"u_face_distance", std::vector<double>{std::clamp(2 * iso.tolerance, 1.0 / 1024, 0.5)}});
   b.uniforms.push_back({"u_bisections", std::vector<int>{bisections(scene.settings)}});
+  const bool mapped = !iso.color_field.empty() && iso.output == Output::color;
+  const TransferFunction map = surface_colors(scene);
+  if (map.color.size() > kMostPoints)
+    throw UsageError(fmt::format("surfaces coloured by the field '{}': {} colour points; at most {} are supported",
+                                 iso.color_field, map.color.size(), kMostPoints));
+  if (mapped) b.uniforms.push_back({"u_surface_points", color_points(map)});
+  b.defines.emplace_back("AMRTEX_SURFACE_POINTS", mapped ? static_cast<int>(map.color.size()) : 0);
+  b.defines.emplace_back("AMRTEX_SURFACE_LOGARITHMIC", mapped && map.logarithmic ? 1 : 0);
   b.defines.emplace_back("AMRTEX_OUTPUT", static_cast<int>(iso.output));
   b.defines.emplace_back("AMRTEX_SHADING", iso.shading == Shading::gradient ? 1 : 0);
 }
 
 /// What the shader draws: pictures of depth and normals have no volume.
 Mode shader_mode(const RenderSettings& s) { return s.mode == Mode::dvr_iso && !s.draws_volume() ? Mode::iso : s.mode; }
+
+/// a, b of each field.
+std::vector<double> value_scales(const EncodedField& field) {
+  std::vector<double> scales;
+  for (int i = 0; i < field.field_count; ++i) {
+    const StorageScale s = field.scale_of(i);
+    scales.insert(scales.end(), {s.offset, s.scale});
+  }
+  return scales;
+}
 
 }  // namespace
 
@@ -152,7 +177,7 @@ UniformValues field_uniforms(const AmrHierarchy& h, const EncodedField& field) {
   uniforms.push_back({"u_domain_cells", std::vector<int>{n.x, n.y, n.z}});
   uniforms.push_back({"u_level_width", widths});
   uniforms.push_back({"u_range_origin", std::vector<double>{field.range_origin}});
-  uniforms.push_back({"u_value_scale", std::vector<double>{field.scale.offset, field.scale.scale}});
+  uniforms.push_back({"u_value_scale", value_scales(field)});
   for (const auto& [name, v] : field.integer_uniforms) uniforms.push_back({name, std::vector<int>{v.x, v.y, v.z}});
   return uniforms;
 }

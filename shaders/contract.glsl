@@ -17,8 +17,11 @@
 #ifndef AMRTEX_LEVELS
 #error AMRTEX_LEVELS must be defined: number of levels
 #endif
+#ifndef AMRTEX_FIELDS
+#error AMRTEX_FIELDS must be defined: how many fields of the mesh the structure holds
+#endif
 #ifndef AMRTEX_VALIDITY
-#error AMRTEX_VALIDITY must be defined: 1 where cells may have no value, else 0
+#error AMRTEX_VALIDITY must be defined: 1 where cells may have no value in some field, else 0
 #endif
 #ifndef AMRTEX_VALUE_RANGES
 #error AMRTEX_VALUE_RANGES must be defined: 1 where regions know their value range, else 0
@@ -32,6 +35,7 @@ DEFINE_INT(AMRTEX_HARDWARE_FILTERING)
 DEFINE_INT(AMRTEX_POWER_OF_TWO)
 DEFINE_INT(AMRTEX_RATIO_SHIFT)
 DEFINE_INT(AMRTEX_LEVELS)
+DEFINE_INT(AMRTEX_FIELDS)
 DEFINE_INT(AMRTEX_VALIDITY)
 DEFINE_INT(AMRTEX_VALUE_RANGES)
 DEFINE_INT(AMRTEX_SCALED_STORAGE)
@@ -42,6 +46,9 @@ DEFINE_INT(AMRTEX_SCALED_STORAGE)
 #define AMRTEX_FILTER_LINEAR_PAGE 2
 #define AMRTEX_FILTER_LINEAR_VERTEX 3
 #define AMRTEX_FILTER_BASIS 4
+
+// the same number as kMostFields (asserted there too)
+#define AMRTEX_MOST_FIELDS 4
 
 #define AMRTEX_NO_RANGE 0xffffffffu  // coded range of a region without mesh
 
@@ -57,7 +64,7 @@ STRUCT Region {
   ivec3 upper;        // finest, exclusive
   int level;
   int width;          // of its cells, in finest cells
-  vec2r value_range;  // of every value that fetch_field can return here (AMRTEX_VALUE_RANGES)
+  vec2r value_range;  // of every value that fetch_field can return here (AMRTEX_VALUE_RANGES): of field 0
   ivec4 handle;       // the encoding's own
   vec3r texture_lower;  // the encoding's own: texture coordinate of q = 0 (hardware filtering) ...
   vec3r texture_scale;  // ... and how much it grows with q
@@ -70,7 +77,7 @@ STRUCT FieldSample {
 
 UNIFORM(ivec3, u_domain_cells)                // finest
 UNIFORM(real, u_range_origin)                 // what decode_range adds to
-UNIFORM(vec2r, u_value_scale)                 // a, b of scaled storage
+UNIFORM_ARRAY(vec2r, u_value_scale, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)  // a, b of each field's scaled storage
 UNIFORM_ARRAY(int, u_level_width, AMRTEX_LEVELS, 64)  // cell width of each level, in finest cells
 
 // Cell width of a level, in finest cells.
@@ -86,10 +93,10 @@ ivec3 divide_by_width(IN(ivec3) cell, IN(int) width) {
   return adjusted / width;
 }
 
-// The value that a texel of scaled storage stands for.
-real decode_value(IN(real) code) {
+// The value that a texel of scaled storage stands for in field number `field`.
+real decode_value(IN(real) code, IN(int) field) {
   if (AMRTEX_SCALED_STORAGE == 0) return code;
-  return u_value_scale.x + u_value_scale.y * code;
+  return u_value_scale[field].x + u_value_scale[field].y * code;
 }
 
 // A value range as encodings store it: distances of minimum and maximum from the field's
@@ -113,6 +120,9 @@ real trilinear(IN(real) v0, IN(real) v1, IN(real) v2, IN(real) v3, IN(real) v4, 
 
 #include AMRTEX_ENCODING_FILE
 
+// The drawn field: number 0, of which ranges, constants and skipping speak.
+real fetch_field(IN(Region) r, IN(vec3r) q) { return fetch_value(r, 0, q); }
+
 bool region_contains(IN(Region) r, IN(ivec3) cell) {
   return all(greaterThanEqual(cell, r.lower)) && all(lessThan(cell, r.upper));
 }
@@ -127,15 +137,18 @@ vec3r region_position(IN(Region) r, IN(Position) p) {
   return q;
 }
 
-// The field at a position; false where there is no value.
-bool sample_field(IN(Position) p, OUT(FieldSample) s) {
+// Field number `field` (a constant at every call) at a position; false where it has no value.
+bool sample_value(IN(Position) p, IN(int) field, OUT(FieldSample) s) {
   Region r;
   s.value = real(0);
   s.level = -1;
   if (any(lessThan(p.cell, ivec3(0))) || any(greaterThanEqual(p.cell, u_domain_cells))) return false;
   if (!locate(p, r)) return false;
-  s.value = fetch_field(r, region_position(r, p));
+  s.value = fetch_value(r, field, region_position(r, p));
   s.level = r.level;
   if (AMRTEX_VALIDITY != 0 && is_no_value(s.value)) return false;
   return true;
 }
+
+// The drawn field.
+bool sample_field(IN(Position) p, OUT(FieldSample) s) { return sample_value(p, 0, s); }

@@ -29,6 +29,9 @@
 #define VALUE_TEXTURE(name)  \
   ValueTexture<real> name{}; \
   Bound bound_##name{bindings, #name, &(name)};
+#define VALUE_TEXTURES(name, count, most) \
+  ValueTexture<real> name[most]{};        \
+  Bound bound_##name{bindings, #name, name};
 #define INTEGER_TEXTURE(name) \
   IntegerTexture name{};      \
   Bound bound_##name{bindings, #name, &(name)};
@@ -55,6 +58,7 @@ class ValueTexture : public Bindable {
  public:
   void bind(const HostTexture& texture) override { texture_ = &texture; }
   vec<4, real> fetch(const ivec3& texel) const {
+    if (texture_ == nullptr) throw Error("fetch from a texture of values that the field does not have");
     const HostTexture& t = *texture_;
     if (any(lessThan(texel, ivec3(0))) || any(greaterThanEqual(texel, t.size)))
       throw Error("texture " + t.name + ": fetch outside of it");  // never read as 0: it would look like data
@@ -145,6 +149,10 @@ struct Bound {
   Bound(Bindings& b, const char* name, dvec2* p) { b.doubles[name] = &p->x; }
   Bound(Bindings& b, const char* name, dvec3* p) { b.doubles[name] = &p->x; }
   Bound(Bindings& b, const char* name, Bindable* p) { b.resources[name] = p; }
+  template <class T, std::size_t n>
+  Bound(Bindings& b, const char* name, ValueTexture<T> (&textures)[n]) {
+    for (std::size_t i = 0; i < n; ++i) b.resources[element_name(name, static_cast<int>(i))] = &textures[i];
+  }
 };
 
 inline float bits_to_float(std::uint32_t bits) { return __builtin_bit_cast(float, bits); }

@@ -24,6 +24,7 @@
 // declarations that C++ turns into members which are bound by name
 #define UNIFORM(T, name) uniform T name;
 #define VALUE_TEXTURE(name) uniform highp sampler3D name;
+#define VALUE_TEXTURES(name, count, most) uniform highp sampler3D name[count];
 #define INTEGER_TEXTURE(name) uniform highp usampler3D name;
 #define UNIFORM_ARRAY(T, name, count, most) uniform T name[count];
 #define BUFFER(T, name, block) \

@@ -1,6 +1,12 @@
-// Entry point of `amrtex sample`: the field at given positions.
+// Entry point of `amrtex sample`: a field at given positions.
 #include "portable_glsl.h"
 #include "contract.glsl"
+#ifndef AMRTEX_PROBE_FIELD
+#error AMRTEX_PROBE_FIELD must be defined: number of the field to sample, below AMRTEX_FIELDS
+#endif
+#if AMRTEX_PROBE_FIELD >= AMRTEX_FIELDS
+#error AMRTEX_PROBE_FIELD must be below AMRTEX_FIELDS
+#endif
 
 layout(local_size_x = 64) in;
 layout(std430) readonly buffer probe_cells_block { ivec4 probe_cells[]; };
@@ -15,6 +21,6 @@ void main() {
   p.cell = probe_cells[i].xyz;
   p.fraction = probe_fractions[i].xyz;
   FieldSample s;
-  bool found = sample_field(p, s);
+  bool found = sample_value(p, AMRTEX_PROBE_FIELD, s);
   probe_values[i] = vec4(s.value, found ? 1.0 : 0.0, float(s.level), 0.0);
 }

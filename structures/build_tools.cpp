@@ -99,8 +99,15 @@ int common_ratio_shift(const AmrHierarchy& hierarchy) {
 
 }  // namespace
 
+bool any_missing(const AmrHierarchy& hierarchy, const BuildRequest& request) {
+  for (int i = 0; i < request.field_count(); ++i)
+    if (hierarchy.has_missing(request.field_at(i))) return true;
+  return false;
+}
+
 EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request,
                          const Json& parameters) {
+  require_fields(encoding, hierarchy, request);
   EncodedField field;
   const bool linear = request.needs.filter != Filter::nearest;
   field.encoding = encoding.name();
@@ -110,7 +117,11 @@ EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy
   field.storage = request.storage;
   const FieldStatistics& s = hierarchy.statistics(request.field);
   field.scale = storage_scale(request.storage, s.min, s.max);
-  const bool validity = hierarchy.has_missing(request.field);
+  field.field_count = request.field_count();
+  for (const int other : request.more_fields) {
+    const FieldStatistics& o = hierarchy.statistics(other);
+    field.more_scales.push_back(storage_scale(request.storage, o.min, o.max));
+  }
   const bool scaled = request.storage != Storage::r32f && request.storage != Storage::r64f;
   field.range_origin = range_origin(s, request.storage, field.scale);
   field.shader.file = fmt::format("{0}/{0}.glsl", encoding.name());
@@ -119,7 +130,8 @@ EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy
                           {"AMRTEX_POWER_OF_TWO", power_of_two_ratios(hierarchy) ? 1 : 0},
                           {"AMRTEX_RATIO_SHIFT", common_ratio_shift(hierarchy)},
                           {"AMRTEX_LEVELS", hierarchy.level_count()},
-                          {"AMRTEX_VALIDITY", validity ? 1 : 0},
+                          {"AMRTEX_FIELDS", field.field_count},
+                          {"AMRTEX_VALIDITY", any_missing(hierarchy, request) ? 1 : 0},
                           {"AMRTEX_VALUE_RANGES", request.needs.value_ranges ? 1 : 0},
                           {"AMRTEX_SCALED_STORAGE", scaled ? 1 : 0}};
   return field;

@@ -20,6 +20,9 @@ struct ValueRange {
 
 /// Code of a range that holds no value: no mesh.
 inline constexpr std::uint32_t kNoRange = 0xffffffffU;
+/// Code of a region where the drawn field has no value and another one has: the mesh is there,
+/// and what the range covers is nothing. It decodes to the origin alone.
+inline constexpr std::uint32_t kVacantRange = 0;
 
 /// What ranges are relative to: at most every value that the shader can return.
 double range_origin(const FieldStatistics& statistics, Storage storage, StorageScale scale);
@@ -44,6 +47,9 @@ inline void set_bit(std::uint32_t* words, std::int64_t bit) { words[bit / 32] |=
 
 /// Does every refinement ratio equal a power of two?
 bool power_of_two_ratios(const AmrHierarchy& hierarchy);
+
+/// Must an encoding of the request's fields keep validity bits? One field with missing cells is enough.
+bool any_missing(const AmrHierarchy& hierarchy, const BuildRequest& request);
 
 /// Fields of EncodedField that are filled in the same way for every encoding.
 EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request,

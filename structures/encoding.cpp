@@ -53,6 +53,12 @@ Filtering parse_filtering(std::string_view name) {
   throw UsageError(fmt::format("no filtering '{}'; accepted: hardware, manual", name));
 }
 
+StorageScale EncodedField::scale_of(int number) const {
+  if (number < 0 || number >= field_count)
+    throw UsageError(fmt::format("encoding {}: no field number {}; the structure holds {}", encoding, number, field_count));
+  return number == 0 ? scale : more_scales[static_cast<std::size_t>(number - 1)];
+}
+
 MemoryByRole EncodedField::memory() const {
   MemoryByRole sum;
   for (const HostTexture& t : textures) sum += t.roles;
@@ -121,6 +127,17 @@ void require_filter(const Encoding& encoding, Filter filter) {
   if (std::find(has.begin(), has.end(), filter) == has.end())
     throw UnsupportedError(
         fmt::format("encoding {}: no filter {}; it has {}", encoding.name(), filter_name(filter), join_names(has, filter_name)));
+}
+
+void require_fields(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request) {
+  if (request.field_count() > kMostFields)
+    throw UsageError(fmt::format("encoding {}: {} fields in one structure; at most {} are supported", encoding.name(),
+                                 request.field_count(), kMostFields));
+  const int known = static_cast<int>(hierarchy.fields().size());
+  for (int i = 0; i < request.field_count(); ++i)
+    if (request.field_at(i) < 0 || request.field_at(i) >= known)
+      throw UsageError(fmt::format("encoding {}: no field with index {}; {} has {}", encoding.name(), request.field_at(i),
+                                   hierarchy.name(), known));
 }
 
 void require_budget(const Encoding& encoding, std::int64_t bytes, const BuildRequest& request) {

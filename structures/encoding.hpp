@@ -15,6 +15,9 @@ namespace amrtex {
 
 using Json = nlohmann::ordered_json;
 
+/// Fields that one built structure may hold (AMRTEX_MOST_FIELDS in shaders/contract.glsl).
+inline constexpr int kMostFields = 4;
+
 /// The field that is reconstructed from the leaf cells (shaders/README.md).
 enum class Filter { nearest, linear_lod, linear_page, linear_vertex, basis };
 std::string_view filter_name(Filter filter);
@@ -72,21 +75,24 @@ struct ParameterInfo {
 };
 
 /// The shader's view of one built field: the file with its locate() and
-/// fetch_field(), and every define that the file requires.
+/// fetch_value(), and every define that the file requires.
 struct ShaderPart {
   std::string file;                                  ///< as known to the shader library, "page_table/page_table.glsl"
   std::vector<std::pair<std::string, int>> defines;  ///< name, value
 };
 
-/// Built data: plain, independent of GL and of any consumer.
+/// Built data: plain, independent of GL and of any consumer. One field of the mesh, or several
+/// over one structure; ranges, constants and skipping are those of the first, the drawn one.
 struct EncodedField {
   std::string encoding;
   Json build_parameters;        ///< complete, with defaults filled in
   FilterDefinition definition;  ///< the mathematics that this field reproduces
   Filtering filtering = Filtering::manual;
   Storage storage = Storage::r32f;
-  StorageScale scale;
-  double range_origin = 0;  ///< what coded value ranges are relative to (build_tools.hpp)
+  int field_count = 1;
+  StorageScale scale;                     ///< of the first field
+  std::vector<StorageScale> more_scales;  ///< of the others
+  double range_origin = 0;                ///< what coded value ranges are relative to (build_tools.hpp)
   ShaderPart shader;
   std::vector<HostTexture> textures;
   std::vector<std::pair<std::string, Vec3i>> integer_uniforms;  ///< ivec3 uniforms of the encoding's GLSL
@@ -94,8 +100,10 @@ struct EncodedField {
   Json statistics;                   ///< counts of the structure: pages, nodes, fill, ...
   std::int64_t host_peak_bytes = 0;  ///< arrays that the build itself allocated at once, the result included
 
+  /// How field number `number` is stored. Throws UsageError naming how many fields there are.
+  StorageScale scale_of(int number) const;
   MemoryByRole memory() const;
-  /// Texels of the textures that hold values.
+  /// Texels of the textures that hold values, of all fields.
   std::int64_t value_texels() const;
   /// Hash over names, formats, sizes and contents of everything the shader reads.
   std::string content_hash() const;
@@ -103,13 +111,17 @@ struct EncodedField {
 };
 
 struct BuildRequest {
-  int field = 0;
-  std::vector<int> more_fields;  ///< fetched beside `field`, at the same places
+  int field = 0;                 ///< the drawn one: number 0 of the contract
+  std::vector<int> more_fields;  ///< beside it, with values at the same places: numbers 1, 2, ...
   Storage storage = Storage::r32f;
   SceneNeeds needs;
   Json parameters = Json::object();                                      ///< unknown keys are an error
   ContextInfo context;                                                   ///< limits to keep
   std::int64_t memory_limit = std::numeric_limits<std::int64_t>::max();  ///< bytes of all textures and buffers
+
+  int field_count() const { return 1 + static_cast<int>(more_fields.size()); }
+  /// Index in the mesh of field number `number`.
+  int field_at(int number) const { return number == 0 ? field : more_fields[static_cast<std::size_t>(number - 1)]; }
 };
 
 /// One GPU data structure for an AMR field. Stateless; one object a registry line.
@@ -138,6 +150,8 @@ const Encoding& find_encoding(std::string_view name);
 Json complete_parameters(const Encoding& encoding, const Json& given);
 /// Throws UnsupportedError naming the filters that the encoding has.
 void require_filter(const Encoding& encoding, Filter filter);
+/// Throws UsageError that says how many fields are supported, or which index the mesh does not have.
+void require_fields(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request);
 /// Throws BudgetError with the bytes needed when `bytes` passes the limit.
 void require_budget(const Encoding& encoding, std::int64_t bytes, const BuildRequest& request);
 

@@ -66,6 +66,8 @@ MemoryByRole& MemoryByRole::operator+=(const MemoryByRole& other) {
   return *this;
 }
 
+std::string element_name(std::string_view name, int i) { return i == 0 ? std::string(name) : fmt::format("{}[{}]", name, i); }
+
 StorageScale storage_scale(Storage storage, double min, double max) {
   if (storage == Storage::r32f || storage == Storage::r64f) return {};
   if (!(max > min)) return {std::isfinite(min) ? min : 0, 1};

@@ -62,6 +62,9 @@ struct HostTexture {
   }
 };
 
+/// Name of element i of an array of textures: `name`, `name[1]`, ...
+std::string element_name(std::string_view name, int i);
+
 /// How values are stored: code = (value - offset) / scale.
 struct StorageScale {
   double offset = 0;  ///< a

@@ -1,7 +1,11 @@
 // What every encoding must do: reproduce the filter's mathematics at every kind of place, on the
 // CPU in double and float and on the GL contexts. Table-driven over the registry.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <set>
+
+#include "renderers/raycaster.hpp"
 #include "renderers/scene_bindings.hpp"
 #include "shaders/shader_library.hpp"
 #include "tests/encoding_cases.hpp"
@@ -351,6 +355,186 @@ TEST(Conformance, MissingValuesSpreadNoFurtherThanTheFootprint) {
       for (const ProbeResult& r : probe_on_gl(gl, missing, field, GpuField(field, gl), far))
         EXPECT_TRUE(r.found && std::isfinite(r.value));
       for (const ProbeResult& r : probe_on_gl(gl, missing, field, GpuField(field, gl), within)) EXPECT_FALSE(r.found);
+    }
+  }
+}
+
+// ---- several fields in one structure ----
+
+const std::vector<NamedMesh>& meshes_of_two_fields() {
+  static const std::vector<NamedMesh> all = [] {
+    std::vector<NamedMesh> list;
+    list.push_back({"every cell has a value", nested(waves).also("g", slopes).hierarchy()});
+    list.push_back({"the fields miss different cells", fields_with_gaps().hierarchy()});
+    list.push_back(
+        {"one field misses cells",
+         single_level(waves).also("g", [](const Vec3d& p) { return p.x < -0.3 && p.z > 2.2 ? kNan : slopes(p); }).hierarchy()});
+    return list;
+  }();
+  return all;
+}
+
+template <class F>
+void for_each_case_of_two_fields(F&& f) {
+  for (const NamedMesh& mesh : meshes_of_two_fields())
+    for (const EncodingCase& c : encoding_cases()) {
+      SCOPED_TRACE(mesh.name + ": " + c.name());
+      f(mesh.hierarchy, c);
+    }
+}
+
+void expect_same(std::span<const FinestPosition> positions, std::span<const ProbeResult> expected,
+                 std::span<const ProbeResult> got, std::string_view what) {
+  const Comparison bits = compare(positions, values_of(expected), got, 0.0);
+  EXPECT_TRUE(bits) << what << ": " << bits;
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    if (expected[i].found && got[i].found) {
+      EXPECT_EQ(got[i].level, expected[i].level);
+    }
+}
+
+TEST(SeveralFields, MissDifferentCellsInTheTests) {
+  const AmrHierarchy& h = meshes_of_two_fields()[1].hierarchy;
+  std::set<std::pair<bool, bool>> seen;
+  for (const FinestPosition& p : probe_positions(h, 100)) {
+    const auto leaf = h.find_leaf(p.cell);
+    if (leaf) seen.emplace(std::isnan(h.value(*leaf, 0)), std::isnan(h.value(*leaf, 1)));
+  }
+  EXPECT_EQ(seen.size(), 4u);
+  EXPECT_TRUE(h.has_holes());
+}
+
+TEST(SeveralFields, EachHasTheBitsOfAStructureOfItsOwnOnTheCpu) {
+  for_each_case_of_two_fields([](const AmrHierarchy& h, const EncodingCase& c) {
+    const auto positions = probe_positions(h, 60);
+    for (const Storage storage : {Storage::r64f, Storage::r32f, Storage::r8, Storage::r16f}) {
+      SCOPED_TRACE(format_name(storage));
+      const Precision precision = storage == Storage::r64f ? Precision::double_precision : Precision::single_precision;
+      const EncodedField both = build(h, c, {.storage = storage, .more_fields = {1}});
+      EXPECT_EQ(both.field_count, 2);
+      for (const int number : {0, 1}) {
+        const EncodedField alone = build(h, c, {.storage = storage, .field = number});
+        EXPECT_EQ(both.scale_of(number).offset, alone.scale.offset);
+        expect_same(positions, probe_on_cpu(h, alone, precision, positions), probe_on_cpu(h, both, precision, positions, number),
+                    fmt::format("field {}", number));
+      }
+    }
+  });
+}
+
+TEST(SeveralFields, EachHasTheBitsOfAStructureOfItsOwnOnGl) {
+  Context& gl = context(ContextKind::egl);
+  for_each_case_of_two_fields([&](const AmrHierarchy& h, const EncodingCase& c) {
+    const auto positions = probe_positions(h, 40);
+    const bool scaled = c.filter == Filter::nearest;  // either storage is compiled in some case
+    const Storage storage = scaled ? Storage::r16 : Storage::r32f;
+    const EncodedField both = build(h, c, {.storage = storage, .more_fields = {1}});
+    const GpuField gpu(both, gl);
+    for (const int number : {0, 1}) {
+      const EncodedField alone = build(h, c, {.storage = storage, .field = number});
+      expect_same(positions, probe_on_gl(gl, h, alone, GpuField(alone, gl), positions),
+                  probe_on_gl(gl, h, both, gpu, positions, number), fmt::format("field {}", number));
+    }
+  });
+}
+
+TEST(SeveralFields, HardwareFilteringReadsTheTextureOfItsField) {
+  Context& gl = context(ContextKind::egl);
+  const AmrHierarchy& h = meshes_of_two_fields()[1].hierarchy;
+  const auto positions = probe_positions(h, 40);
+  for (const EncodingCase& c : encoding_cases()) {
+    if (c.filter == Filter::nearest) continue;
+    SCOPED_TRACE(c.name());
+    const EncodedField both = build(h, c, {.filtering = Filtering::hardware, .more_fields = {1}});
+    const GpuField gpu(both, gl);
+    for (const int number : {0, 1}) {
+      const EncodedField manual = build(h, c, {.field = number});
+      const FieldStatistics& s = h.statistics(number);
+      const Comparison result = compare(positions, values_of(probe_on_cpu(h, manual, Precision::single_precision, positions)),
+                                        probe_on_gl(gl, h, both, gpu, positions, number), 0x1p-11 * (s.max - s.min));
+      EXPECT_TRUE(result) << result;
+    }
+  }
+}
+
+/// Seen askew from outside; half of the values are invisible, so that regions are skipped.
+Scene askew(const AmrHierarchy& h, Mode mode) {
+  Scene scene;
+  const Vec3d middle = (h.domain_lower() + h.domain_upper()) * 0.5;
+  const Vec3d size = h.domain_upper() - h.domain_lower();
+  scene.view.eye = middle + size * Vec3d(1.1, -1.7, 0.8);
+  scene.view.at = middle;
+  scene.transfer_function.extinction = {{0.5, 0}, {1, 20}};
+  scene.transfer_function.color = {{0, {1, 0.2, 0}}, {1, {0, 0.5, 1}}};
+  scene.settings.mode = mode;
+  scene.settings.width = 40;
+  scene.settings.height = 32;
+  return scene;
+}
+
+TEST(SeveralFields, ThePictureIsThatOfTheFirstAlone) {
+  Context& gl = context(ContextKind::egl);
+  const AmrHierarchy& h = meshes_of_two_fields()[1].hierarchy;
+  for (const EncodingCase& c : encoding_cases()) {
+    SCOPED_TRACE(c.name());
+    for (const Mode mode : {Mode::dvr, Mode::mip}) {
+      const Scene scene = askew(h, mode);
+      const auto draw = [&](const EncodedField& field) {
+        const GpuField gpu(field, gl);
+        Raycaster raycaster(gl, h, field, gpu, scene);
+        raycaster.draw();
+        return raycaster.read().values;
+      };
+      const auto alone = draw(build(h, c));
+      EXPECT_GT(*std::max_element(alone.begin(), alone.end()), 0);
+      EXPECT_EQ(draw(build(h, c, {.more_fields = {1}})), alone);
+    }
+  }
+}
+
+TEST(SeveralFields, OneFieldPaysNothing) {
+  const AmrHierarchy h = single_level(waves).also("g", slopes).hierarchy();  // no page is constant
+  for (const EncodingCase& c : encoding_cases()) {
+    SCOPED_TRACE(c.name());
+    const EncodedField one = build(h, c);
+    EXPECT_EQ(one.field_count, 1);
+    EXPECT_TRUE(one.more_scales.empty());
+    for (const HostTexture& t : one.textures) EXPECT_EQ(t.name.find('['), std::string::npos) << t.name;
+    std::vector<std::string> about_fields;
+    for (const auto& [name, value] : one.shader.defines)
+      if (name.find("FIELD") != std::string::npos) about_fields.push_back(fmt::format("{}={}", name, value));
+    EXPECT_EQ(about_fields, std::vector<std::string>{"AMRTEX_FIELDS=1"});
+    for (const UniformValue& u : field_uniforms(h, one))
+      if (u.name == "u_value_scale") {
+        EXPECT_EQ(std::get<std::vector<double>>(u.numbers).size(), 2u);
+      }
+    // a further field costs its values and no structure
+    const EncodedField two = build(h, c, {.more_fields = {1}});
+    EXPECT_EQ(two.value_texels(), 2 * one.value_texels());
+    EXPECT_EQ(two.memory().payload, 2 * one.memory().payload);
+    EXPECT_EQ(two.memory().duplicated, 2 * one.memory().duplicated);
+    EXPECT_EQ(two.memory().topology, one.memory().topology);
+  }
+}
+
+TEST(SeveralFields, FourAreTakenAndFiveRefused) {
+  Context& gl = context(ContextKind::egl);
+  const AmrHierarchy& h = meshes_of_two_fields()[1].hierarchy;
+  const auto positions = probe_positions(h, 20);
+  for (const EncodingCase& c : encoding_cases()) {
+    SCOPED_TRACE(c.name());
+    const EncodedField four = build(h, c, {.more_fields = {1, 0, 1}});
+    const GpuField gpu(four, gl);
+    expect_same(positions, probe_on_gl(gl, h, four, gpu, positions, 1), probe_on_gl(gl, h, four, gpu, positions, 3), "3 is 1");
+    EXPECT_THROW(probe_on_gl(gl, h, four, gpu, positions, 4), UsageError);
+    EXPECT_THROW(probe_on_cpu(h, four, Precision::single_precision, positions, 4), UsageError);
+    EXPECT_THROW(build(h, c, {.more_fields = {2}}), UsageError) << "the mesh has two";
+    try {
+      build(h, c, {.more_fields = {1, 0, 1, 0}});
+      ADD_FAILURE() << "five fields were built";
+    } catch (const UsageError& e) {
+      EXPECT_THAT(e.what(), testing::AllOf(testing::HasSubstr(std::string(c.encoding->name())), testing::HasSubstr("5 fields"),
+                                           testing::HasSubstr("at most 4")));
     }
   }
 }

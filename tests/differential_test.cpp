@@ -79,6 +79,29 @@ TEST(Differential, DoubleIsTheReferenceOnRandomMeshes) {
   EXPECT_GT(refusals.built, static_cast<int>(kSeeds));
 }
 
+TEST(Differential, EachOfSeveralFieldsHasTheBitsOfAStructureOfItsOwn) {
+  Refusals refusals;
+  RandomMeshOptions options = small_meshes();
+  options.fields = 3;
+  for (std::uint64_t seed = 200; seed < 224; ++seed) {
+    const AmrHierarchy h(random_mesh(seed, options));
+    const auto positions = probe_positions(h, 16, seed);
+    for (const EncodingCase& c : encoding_cases()) {
+      const auto together = refusals.try_build(h, c, {.field = 1, .more_fields = {2, 0}});
+      if (!together) continue;
+      for (int number = 0; number < 3; ++number) {
+        SCOPED_TRACE(fmt::format("seed {}: {}, field number {}", seed, c.name(), number));
+        const EncodedField alone = build(h, c, {.field = (number + 1) % 3});
+        const auto expected = values_of(probe_on_cpu(h, alone, Precision::single_precision, positions));
+        const Comparison bits =
+            compare(positions, expected, probe_on_cpu(h, *together, Precision::single_precision, positions, number), 0.0);
+        EXPECT_TRUE(bits) << bits;
+      }
+    }
+  }
+  refusals.print();
+}
+
 TEST(Differential, GlIsTheReferenceAndTheCpusBitsOnRandomMeshes) {
   Refusals refusals;
   for (const ContextKind kind : kContexts)

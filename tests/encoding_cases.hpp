@@ -42,11 +42,15 @@ struct BuildOptions {
   Storage storage = Storage::r32f;
   Filtering filtering = Filtering::manual;
   bool value_ranges = true;
+  int field = 0;
+  std::vector<int> more_fields = {};
 };
 
 /// Throws UnsupportedError for a mesh or combination that the encoding refuses.
 inline EncodedField build(const AmrHierarchy& h, const EncodingCase& c, const BuildOptions& options = {}) {
   BuildRequest request;
+  request.field = options.field;
+  request.more_fields = options.more_fields;
   request.storage = options.storage;
   request.needs.filter = c.filter;
   request.needs.filtering = options.filtering;

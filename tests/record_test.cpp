@@ -154,6 +154,8 @@ TEST(MemoryJson, AddsUpAndCountsValueTexelsACell) {
   record["memory"] = memory;
   EXPECT_EQ(complaint(record), "valid");
   EXPECT_TRUE(memory_json(field, 0)["texels_per_cell"].is_null());
+  field.field_count = 2;  // of one field: a cell of each
+  EXPECT_EQ(memory_json(field, 32)["texels_per_cell"], 1.0);
 }
 
 // XXH3-128 of {"encoding":"uniform","n":3,"step":0.5}, as `xxh128sum` prints it.

@@ -27,6 +27,9 @@ inline double waves(const Vec3d& p) {
   return 0.5 + 0.3 * std::sin(7 * p.x + 1) * std::cos(5 * p.y) + 0.2 * p.z * std::sin(11 * p.x + 3 * p.z);
 }
 
+/// Another field, of another range.
+inline double slopes(const Vec3d& p) { return -20 + 9 * p.x - 35 * p.y * p.z + 4 * std::cos(9 * p.z + p.x); }
+
 /// A mesh as a chain of calls, ended by hierarchy().
 class MeshBuilder {
  public:
@@ -50,6 +53,16 @@ class MeshBuilder {
   /// Values as given, x fastest.
   MeshBuilder& patch(int level, const Box& box, std::vector<double> values) {
     mesh_.levels[static_cast<std::size_t>(level)].push_back({box, {std::move(values)}});
+    return *this;
+  }
+  /// A further field over the patches so far.
+  MeshBuilder& also(const std::string& name, const Function& f) {
+    mesh_.fields.push_back(name);
+    for (std::size_t level = 0; level < mesh_.levels.size(); ++level)
+      for (Patch& patch : mesh_.levels[level]) {
+        std::vector<double>& values = patch.values.emplace_back();
+        for_each_cell(patch.box, [&](const Vec3i& c) { values.push_back(f(centre(static_cast<int>(level), c))); });
+      }
     return *this;
   }
   /// One patch over the whole of level 0.
@@ -102,6 +115,23 @@ inline MeshBuilder holes_and_missing(const Function& f, int ratio = 2) {
   };
   mesh.patch(1, Box{{2, 4, 1}, {4, 7, 3}}.refined(ratio), with_nan);
   return mesh.patch(1, Box{{5, 5, 5}, {7, 7, 8}}.refined(ratio), f);
+}
+
+/// Two fields that miss different cells: each alone, both together, in whole blocks of 32 finest cells,
+/// in whole pages and here and there; and a hole.
+inline MeshBuilder fields_with_gaps() {
+  const auto both = [](const Vec3d& p) { return p.x >= 0.75 && p.y >= 0.5 && p.z < 0.5; };
+  const auto cell = [](const Vec3d& p) { return Vec3i(p * Vec3d(32, 8, 8)); };
+  const Function f = [=](const Vec3d& p) {
+    return p.x < 0.5 || both(p) || cell(p) == Vec3i(21, 3, 6) || cell(p) == Vec3i(26, 5, 6) ? kNan : waves(p);
+  };
+  const Function g = [=](const Vec3d& p) {
+    const bool gap = p.x >= 0.5 && p.x < 0.75 && p.y < 0.5;
+    return gap || both(p) || cell(p) == Vec3i(9, 3, 3) || cell(p) == Vec3i(26, 5, 6) ? kNan : slopes(p);
+  };
+  MeshBuilder mesh({32, 8, 8}, {2});
+  mesh.patch(0, {{0, 0, 0}, {30, 8, 8}}, f).patch(1, Box{{20, 2, 2}, {28, 6, 7}}.refined(2), f);
+  return mesh.also("g", g);
 }
 
 struct NamedMesh {

@@ -34,6 +34,7 @@ struct Options {
   int edge;    ///< texels along the edge of a stored page
   std::int64_t page_texels() const { return std::int64_t{edge} * edge * edge; }
   std::int64_t page_cells() const { return std::int64_t{page_size} * page_size * page_size; }
+  std::int64_t page_words() const { return page_cells() / 32; }  ///< of validity bits, of one field
 };
 
 /// A final page of the partition: where it lies, and what became of it.
@@ -43,7 +44,6 @@ struct Page {
   int kind = AMRTEX_PAGE_ABSENT;
   std::uint32_t index = 0;  ///< in the pool
   std::uint32_t green = 0;  ///< second channel of its entries
-  ValueRange range;
 };
 
 std::uint32_t red_of(int kind, int level, std::uint32_t index) {
@@ -87,7 +87,7 @@ std::vector<Page> partition(const AmrHierarchy& h, int page_size) {
     const Box inside = intersection(box, h.domain(level));
     if (inside.empty()) return;
     if (!h.refined_within(level, inside)) {
-      pages.push_back({.level = level, .index_in_level = index, .range = {}});
+      pages.push_back({.level = level, .index_in_level = index});
       return;
     }
     const int r = h.ratio_to_finer(level);
@@ -164,28 +164,32 @@ TablePlan plan_table(const AmrHierarchy& h, const std::vector<Page>& pages, int 
   return plan;
 }
 
-/// Values of one page as they will be stored.
+/// What one field has in one page.
+struct PageContents {
+  ValueRange range;  ///< of all texels, the border and fills included
+  bool any = true;   ///< has any cell a value?
+  bool all = true;   ///< have all of them in the domain?
+};
+
+/// Values of one page as they will be stored, of one field after the other.
 class PageReader {
  public:
-  PageReader(const AmrHierarchy& h, const BuildRequest& request, const Options& options)
-      : hierarchy_(h),
-        request_(request),
-        options_(options),
-        values_(static_cast<std::size_t>(options.page_texels())),
-        missing_(values_.size()) {}
+  PageReader(const AmrHierarchy& h, const Options& options)
+      : hierarchy_(h), options_(options), values_(static_cast<std::size_t>(options.page_texels())), missing_(values_.size()) {}
 
-  /// Fills values() and the page's kind, range and constant.
-  void read(Page& page) {
+  /// Fills values() from a field of the mesh.
+  PageContents read(const Page& page, int field) {
     const Vec3i first = page.index_in_level * options_.page_size;
     const Box cells{first, first + Vec3i(options_.page_size)};
     box_ = options_.nodes ? Box{first, first + Vec3i(options_.edge)} : cells.grown(options_.border);
     if (options_.nodes) {
-      vertex_values(hierarchy_, request_.field, page.level, box_, values_);
-      if (hierarchy_.has_missing(request_.field)) mark_missing(page.level, cells);
+      vertex_values(hierarchy_, field, page.level, box_, values_);
+      std::fill(missing_.begin(), missing_.end(), std::uint8_t{0});  // another field may have been read before
+      if (hierarchy_.has_missing(field)) mark_missing(page.level, cells, field);
     } else {
-      filled_level_values(hierarchy_, request_.field, page.level, box_, values_, missing_);
+      filled_level_values(hierarchy_, field, page.level, box_, values_, missing_);
     }
-    classify(page, cells);
+    return contents(intersection(cells, hierarchy_.domain(page.level)), field);
   }
   std::span<const double> values() const { return values_; }
 
@@ -204,46 +208,48 @@ class PageReader {
   /// In a node-centred page the missing flags belong to cells and stand at their lower vertex.
   bool is_missing(const Vec3i& cell) const { return missing_[box_.offset(cell)] != 0; }
 
-  void mark_missing(int level, const Box& cells) {
+  void mark_missing(int level, const Box& cells, int field) {
     std::vector<double> own(static_cast<std::size_t>(cells.cells()));
-    level_values(hierarchy_, request_.field, level, cells, own);
-    std::fill(missing_.begin(), missing_.end(), std::uint8_t{0});
+    level_values(hierarchy_, field, level, cells, own);
     std::size_t i = 0;
     for_each_cell(cells, [&](const Vec3i& c) { missing_[box_.offset(c)] = std::isnan(own[i++]) ? 1 : 0; });
   }
 
-  void classify(Page& page, const Box& cells) {
-    page.range = {};
-    for (double v : values_) page.range.add(v);
-    const Box inside = intersection(cells, hierarchy_.domain(page.level));
-    bool any = false;
-    bool all = true;
-    if (hierarchy_.has_missing(request_.field)) {
-      for_each_cell(inside, [&](const Vec3i& c) { (is_missing(c) ? all : any) = !is_missing(c); });
-    } else {
-      any = true;
-    }
-    page.kind = AMRTEX_PAGE_STORED;
-    if (!any)
-      page.kind = AMRTEX_PAGE_ABSENT;
-    else if (all && page.range.min == page.range.max && constant_is_exact(page.range.min)) {
-      page.kind = AMRTEX_PAGE_CONSTANT;
-      page.green = std::bit_cast<std::uint32_t>(static_cast<float>(page.range.min));
-    }
-  }
-
-  /// The table holds a float: what it would lose, a page of the same storage must lose as well.
-  bool constant_is_exact(double v) const {
-    return request_.storage == Storage::r32f || static_cast<double>(static_cast<float>(v)) == v;
+  PageContents contents(const Box& inside, int field) const {
+    PageContents c;
+    for (double v : values_) c.range.add(v);
+    if (!hierarchy_.has_missing(field)) return c;
+    c.any = false;
+    for_each_cell(inside, [&](const Vec3i& cell) { (is_missing(cell) ? c.all : c.any) = !is_missing(cell); });
+    return c;
   }
 
   const AmrHierarchy& hierarchy_;
-  const BuildRequest& request_;
   const Options& options_;
   Box box_;
   std::vector<double> values_;
   std::vector<std::uint8_t> missing_;
 };
+
+/// The table holds a float: what it would lose, a page of the same storage must lose as well.
+bool constant_is_exact(double v, Storage storage) {
+  return storage == Storage::r32f || static_cast<double>(static_cast<float>(v)) == v;
+}
+
+/// A constant page is one of a single field: an entry has room for one value, and what is constant in
+/// one field seldom is in the others.
+bool is_constant(const PageContents& c, const BuildRequest& request) {
+  return request.more_fields.empty() && c.all && c.range.min == c.range.max && constant_is_exact(c.range.min, request.storage);
+}
+
+/// Sets the kind of a page, and what a constant one holds. Further fields are read only where those before have nothing.
+void classify(PageReader& reader, const BuildRequest& request, Page& page) {
+  PageContents c = reader.read(page, request.field);
+  for (const int other : request.more_fields)
+    if (!c.any) c = reader.read(page, other);
+  page.kind = !c.any ? AMRTEX_PAGE_ABSENT : is_constant(c, request) ? AMRTEX_PAGE_CONSTANT : AMRTEX_PAGE_STORED;
+  if (page.kind == AMRTEX_PAGE_CONSTANT) page.green = std::bit_cast<std::uint32_t>(static_cast<float>(c.range.min));
+}
 
 struct Sizes {
   std::int64_t stored = 0;
@@ -309,7 +315,8 @@ Sizes PageTable::sizes(std::int64_t stored, const Options& o, const TablePlan& t
     throw UnsupportedError(
         fmt::format("encoding page_table with page_size {}: {} pages of {}^3 texels do not fit a 3D texture of {} texels an axis",
                     o.page_size, stored, o.edge, limit));
-  const std::int64_t validity_bytes = validity ? stored * o.page_cells() / 8 : 0;
+  const int fields = request.field_count();
+  const std::int64_t validity_bytes = validity ? fields * stored * o.page_cells() / 8 : 0;
   if (validity_bytes > request.context.max_buffer_bytes)
     throw UnsupportedError(
         fmt::format("encoding page_table with page_size {}: validity bits take {} bytes, a buffer of this context at most {}",
@@ -318,8 +325,8 @@ Sizes PageTable::sizes(std::int64_t stored, const Options& o, const TablePlan& t
     throw UnsupportedError(
         fmt::format("encoding page_table with page_size {}: {} pages, an entry of the table numbers at most {}", o.page_size,
                     stored, kMostPages));
-  require_budget(*this, s.pool_texels() * texel_bytes(request.storage) + table.top_bytes() + table.sub_bytes() + validity_bytes,
-                 request);
+  const std::int64_t pool_bytes = fields * s.pool_texels() * texel_bytes(request.storage);
+  require_budget(*this, pool_bytes + table.top_bytes() + table.sub_bytes() + validity_bytes, request);
   return s;
 }
 
@@ -337,8 +344,8 @@ void write_page(const Options& o, const PoolLayout& pool, std::int64_t index, St
 /// Reads every page to learn what is absent or constant, then numbers the stored ones.
 std::int64_t number_pages(const AmrHierarchy& h, const BuildRequest& request, const Options& o, std::vector<Page>& pages) {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pages.size(), 8), [&](const auto& range) {
-    PageReader reader(h, request, o);
-    for (std::size_t i = range.begin(); i != range.end(); ++i) reader.read(pages[i]);
+    PageReader reader(h, o);
+    for (std::size_t i = range.begin(); i != range.end(); ++i) classify(reader, request, pages[i]);
   });
   std::int64_t stored = 0;
   for (Page& p : pages)
@@ -452,35 +459,73 @@ double leaked_value(const FieldStatistics& s, const Vec3i& pool) {
 
 /// What the pages are written to.
 struct Storages {
-  HostTexture pool;
-  HostTexture validity;  ///< without data where every cell has a value
+  std::vector<HostTexture> pools;  ///< one a field, all laid out in the same way
+  HostTexture validity;            ///< without data where every cell has a value
 };
 
-/// Reads the stored pages once more and writes their values, validity bits and coded ranges.
+Storages make_storages(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Sizes& size,
+                       const EncodedField& field, const std::vector<Page>& pages) {
+  Storages out;
+  for (int number = 0; number < field.field_count; ++number) {
+    HostTexture& pool =
+        out.pools.emplace_back(make_texture(element_name("tex_pages", number), field.storage, size.pool.texels()));
+    pool.hardware_linear = field.filtering == Filtering::hardware;
+    pool.holds_values = true;
+    pool.roles = pool_roles(h, o, pages, pool);
+  }
+  if (any_missing(h, request))
+    out.validity = make_buffer("page_validity", TexelFormat::r32ui, size.stored * field.field_count * o.page_words());
+  return out;
+}
+
+/// Writes stored pages: values, validity bits and coded ranges.
+class PageWriter {
+ public:
+  PageWriter(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Sizes& size, const EncodedField& field,
+             Storages& out)
+      : request_(request), options_(o), size_(size), field_(field), out_(out), reader_(h, o) {
+    const HostTexture& pool = out.pools.front();
+    if (pool.hardware_linear && o.nodes) leak_ = leaked_value(h.statistics(request.field), pool.size);
+  }
+
+  void write(Page& page) {
+    for (int number = 0; number < field_.field_count; ++number) {
+      const PageContents contents = reader_.read(page, request_.field_at(number));
+      write_page(options_, size_.pool, page.index, request_.storage, field_.scale_of(number), reader_.values(),
+                 out_.pools[static_cast<std::size_t>(number)]);
+      if (!out_.validity.data.empty()) reader_.write_validity(page, validity_words(page, number));
+      if (number == 0 && request_.needs.value_ranges) page.green = coded_range(contents);
+    }
+  }
+
+ private:
+  /// A page's words of all fields stand side by side.
+  std::uint32_t* validity_words(const Page& page, int number) {
+    return out_.validity.as<std::uint32_t>() + (page.index * field_.field_count + number) * options_.page_words();
+  }
+  std::uint32_t coded_range(const PageContents& c) const {
+    if (!c.any) return kVacantRange;
+    return encode_range({c.range.min - leak_, c.range.max + leak_}, field_.range_origin, request_.storage, field_.scale);
+  }
+
+  const BuildRequest& request_;
+  const Options& options_;
+  const Sizes& size_;
+  const EncodedField& field_;
+  Storages& out_;
+  PageReader reader_;
+  double leak_ = 0;
+};
+
+/// Reads the stored pages once more, to store them.
 Storages store_pages(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Sizes& size,
                      const EncodedField& field, std::vector<Page>& pages) {
-  Storages out;
-  out.pool = make_texture("tex_pages", request.storage, size.pool.texels());
-  out.pool.hardware_linear = field.filtering == Filtering::hardware;
-  out.pool.holds_values = true;
-  const bool validity = h.has_missing(request.field);
-  const std::int64_t words = o.page_cells() / 32;  // a page
-  if (validity) out.validity = make_buffer("page_validity", TexelFormat::r32ui, size.stored * words);
-  const double leak = out.pool.hardware_linear && o.nodes ? leaked_value(h.statistics(request.field), out.pool.size) : 0;
+  Storages out = make_storages(h, request, o, size, field, pages);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pages.size(), 8), [&](const auto& range) {
-    PageReader reader(h, request, o);
-    for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      Page& page = pages[i];
-      if (page.kind != AMRTEX_PAGE_STORED) continue;
-      reader.read(page);
-      write_page(o, size.pool, page.index, request.storage, field.scale, reader.values(), out.pool);
-      if (validity) reader.write_validity(page, out.validity.as<std::uint32_t>() + page.index * words);
-      if (request.needs.value_ranges)
-        page.green =
-            encode_range({page.range.min - leak, page.range.max + leak}, field.range_origin, request.storage, field.scale);
-    }
+    PageWriter writer(h, request, o, size, field, out);
+    for (std::size_t i = range.begin(); i != range.end(); ++i)
+      if (pages[i].kind == AMRTEX_PAGE_STORED) writer.write(pages[i]);
   });
-  out.pool.roles = pool_roles(h, o, pages, out.pool);
   return out;
 }
 
@@ -505,22 +550,25 @@ void add_shader_inputs(const AmrHierarchy& h, const Options& o, const TablePlan&
   uniforms.emplace_back("u_subtable_shift", table.sub_layout.shift);
 }
 
-std::vector<LeftOut> left_out(const Options& o, const TablePlan& table, std::int64_t stored, bool validity, Storage storage) {
+std::vector<LeftOut> left_out(const Options& o, const TablePlan& table, std::int64_t stored, bool validity,
+                              const EncodedField& field) {
   std::vector<LeftOut> list;
-  if (!validity) list.push_back({"validity bits", "every cell has a value", stored * o.page_cells() / 8});
+  const std::int64_t pages = stored * field.field_count;
+  if (!validity) list.push_back({"validity bits", "every cell has a value", pages * o.page_cells() / 8});
   if (!table.green)
     list.push_back(
         {"second channel of the table", "no region is skipped and no page is constant", table.top_bytes() + table.sub_bytes()});
   if (!o.nodes && o.border == 0) {
     const std::int64_t with_border = std::int64_t{o.page_size + 2} * (o.page_size + 2) * (o.page_size + 2);
-    list.push_back(
-        {"border layer", "the filter nearest reads one cell", stored * (with_border - o.page_cells()) * texel_bytes(storage)});
+    list.push_back({"border layer", "the filter nearest reads one cell",
+                    pages * (with_border - o.page_cells()) * texel_bytes(field.storage)});
   }
   return list;
 }
 
 EncodedField PageTable::build(const AmrHierarchy& h, const BuildRequest& request) const {
   require_filter(*this, request.needs.filter);
+  require_fields(*this, h, request);
   const Json parameters = complete_parameters(*this, request.parameters);
   const Options o = options(parameters, request.needs.filter);
   if (h.level_count() > kMostLevels)
@@ -530,7 +578,7 @@ EncodedField PageTable::build(const AmrHierarchy& h, const BuildRequest& request
   const std::int64_t stored = number_pages(h, request, o, pages);
   const bool constants = std::any_of(pages.begin(), pages.end(), [](const Page& p) { return p.kind == AMRTEX_PAGE_CONSTANT; });
   const TablePlan table = plan_table(h, pages, o.page_size, request, constants);
-  const bool validity = h.has_missing(request.field);
+  const bool validity = any_missing(h, request);
   const Sizes size = sizes(stored, o, table, validity, request);
 
   EncodedField field = start_field(*this, h, request, parameters);
@@ -538,9 +586,9 @@ EncodedField PageTable::build(const AmrHierarchy& h, const BuildRequest& request
   Storages stores = store_pages(h, request, o, size, field, pages);
   field.statistics = statistics(h, o, pages, table, stored);
   add_shader_inputs(h, o, table, size, constants, field);
-  field.left_out = left_out(o, table, stored, validity, request.storage);
+  field.left_out = left_out(o, table, stored, validity, field);
   field.textures = make_table(h, table, pages);
-  field.textures.push_back(std::move(stores.pool));
+  for (HostTexture& pool : stores.pools) field.textures.push_back(std::move(pool));
   if (validity) field.textures.push_back(std::move(stores.validity));
   field.host_peak_bytes = field.memory().total() + static_cast<std::int64_t>(pages.size() * sizeof(Page));
   return field;

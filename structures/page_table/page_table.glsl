@@ -1,4 +1,4 @@
-// page_table: one or two table look-ups a region, one filtered fetch a sample.
+// page_table: one or two table look-ups a region, one filtered fetch a sample and field.
 #include "page_table/page_table_layout.h"
 #if !AMRTEX_CPP
 #ifndef AMRTEX_PAGE_SIZE
@@ -39,11 +39,11 @@ INTEGER_TEXTURE(tex_page_subtables)
 UNIFORM(ivec3, u_subtable)        // x: entries along an edge; y: width of an entry, finest cells; z: unused
 UNIFORM(ivec3, u_subtable_shift)  // log2 of sub-tables along x and y of their texture
 #endif
-VALUE_TEXTURE(tex_pages)
+VALUE_TEXTURES(tex_pages, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)
 UNIFORM(ivec3, u_page_table)     // x: width of a table entry, finest cells
 UNIFORM(ivec3, u_pool_shift)     // log2 of pages along x and y of the pool
 #if AMRTEX_CPP || AMRTEX_VALIDITY
-BUFFER(uint, page_validity, page_validity_block)  // one bit a cell, each page from a new word
+BUFFER(uint, page_validity, page_validity_block)  // one bit a cell, each field of each page from a new word
 #endif
 
 // Position of block `index` in a texture that holds 2^shift.x by 2^shift.y by n blocks.
@@ -90,38 +90,41 @@ bool locate(IN(Position) p, OUT(Region) r) {
 }
 
 #if AMRTEX_CPP || AMRTEX_VALIDITY
-bool page_has_value(IN(Region) r, IN(ivec3) cell) {
+bool page_has_value(IN(Region) r, IN(int) field, IN(ivec3) cell) {
   if (r.handle.w < 0) return true;
   ivec3 c = clamp(cell, ivec3(0), ivec3(AMRTEX_PAGE_SIZE - 1));
   int bit = c.x + AMRTEX_PAGE_SIZE * (c.y + AMRTEX_PAGE_SIZE * c.z);
   int words = AMRTEX_PAGE_SIZE * AMRTEX_PAGE_SIZE * AMRTEX_PAGE_SIZE / 32;
-  return ((page_validity[r.handle.w * words + (bit >> 5)] >> uint(bit & 31)) & 1u) != 0u;
+  return ((page_validity[(r.handle.w * AMRTEX_FIELDS + field) * words + (bit >> 5)] >> uint(bit & 31)) & 1u) != 0u;
 }
 #endif
 
-real page_texel(IN(ivec3) texel) { return texelFetch(tex_pages, texel, 0).x; }
+real page_texel(IN(int) field, IN(ivec3) texel) { return texelFetch(tex_pages[field], texel, 0).x; }
 
-real page_stored_value(IN(Region) r, IN(vec3r) q) {
+real page_stored_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
   ivec3 page = ivec3(r.handle.x, r.handle.y, r.handle.z);
-  if (AMRTEX_FILTER == AMRTEX_FILTER_NEAREST)
-    return decode_value(page_texel(page + clamp(ivec3(floor(q)), ivec3(0), ivec3(AMRTEX_PAGE_SIZE - 1)) + AMRTEX_PAGE_BORDER));
+  if (AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) {
+    ivec3 cell = clamp(ivec3(floor(q)), ivec3(0), ivec3(AMRTEX_PAGE_SIZE - 1));
+    return decode_value(page_texel(field, page + cell + AMRTEX_PAGE_BORDER), field);
+  }
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
-  return decode_value(textureLod(tex_pages, r.texture_lower + q * r.texture_scale, 0.0).x);
+  return decode_value(textureLod(tex_pages[field], r.texture_lower + q * r.texture_scale, 0.0).x, field);
 #else
   PRECISE vec3r from_first = AMRTEX_PAGE_NODES != 0 ? q : q + vec3r(real(AMRTEX_PAGE_BORDER) - real(0.5));
   vec3r whole = clamp(floor(from_first), vec3r(0), vec3r(AMRTEX_PAGE_EDGE - 2));
   vec3r f = from_first - whole;
   ivec3 i = page + ivec3(whole);
-  return decode_value(trilinear(page_texel(i), page_texel(i + ivec3(1, 0, 0)), page_texel(i + ivec3(0, 1, 0)), page_texel(i + ivec3(1, 1, 0)),
-                                page_texel(i + ivec3(0, 0, 1)), page_texel(i + ivec3(1, 0, 1)), page_texel(i + ivec3(0, 1, 1)),
-                                page_texel(i + ivec3(1, 1, 1)), f));
+  return decode_value(trilinear(page_texel(field, i), page_texel(field, i + ivec3(1, 0, 0)), page_texel(field, i + ivec3(0, 1, 0)),
+                                page_texel(field, i + ivec3(1, 1, 0)), page_texel(field, i + ivec3(0, 0, 1)),
+                                page_texel(field, i + ivec3(1, 0, 1)), page_texel(field, i + ivec3(0, 1, 1)),
+                                page_texel(field, i + ivec3(1, 1, 1)), f), field);
 #endif
 }
 
-real fetch_field(IN(Region) r, IN(vec3r) q) {
+real fetch_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
 #if AMRTEX_CPP || AMRTEX_VALIDITY
-  if (AMRTEX_VALIDITY != 0 && !page_has_value(r, ivec3(floor(q)))) return no_value();
+  if (AMRTEX_VALIDITY != 0 && !page_has_value(r, field, ivec3(floor(q)))) return no_value();
 #endif
   if (AMRTEX_PAGE_CONSTANTS != 0 && r.handle.w < 0) return as_real(uint(r.handle.z));
-  return page_stored_value(r, q);
+  return page_stored_value(r, field, q);
 }

@@ -143,6 +143,31 @@ TEST(PageTable, AbsentPagesCostAnEntryAndNoPage) {
   }
 }
 
+TEST(PageTable, SeveralFieldsShareATableAndStoreWhatAnyOfThemHas) {
+  // of the 8 x 2 x 2 root pages of 4^3 cells the first field has none in x < 16, both miss [24, 30) x [4, 8) x [0, 4)
+  const AmrHierarchy h = fields_with_gaps().hierarchy();
+  const EncodedField both = page_field(h, Filter::nearest, 4, {.more_fields = {1}});
+  const EncodedField first = page_field(h, Filter::nearest, 4);
+  const auto count = [](const EncodedField& f, const char* what) { return f.statistics[what].get<std::int64_t>(); };
+  EXPECT_EQ(count(first, "pages"), count(both, "pages") - 16);
+  EXPECT_EQ(count(both, "pages") + count(both, "absent_pages"), count(first, "pages") + count(first, "absent_pages"));
+  EXPECT_GT(count(both, "absent_pages"), 0);
+  EXPECT_EQ(both.find("tex_pages[1]")->roles, both.find("tex_pages")->roles);
+  EXPECT_EQ(both.find("page_validity")->texels(), 2 * 2 * count(both, "pages")) << "64 bits a page and field";
+}
+
+TEST(PageTable, SeveralFieldsHaveNoConstantPages) {
+  const AmrHierarchy h = MeshBuilder(Vec3i(16)).root(constant(2)).also("g", constant(3)).hierarchy();
+  EXPECT_EQ(page_field(h, Filter::linear_page, 4).statistics["constant_pages"], 64);
+  const EncodedField both = page_field(h, Filter::linear_page, 4, {.more_fields = {1}});
+  EXPECT_EQ(both.statistics["constant_pages"], 0);
+  EXPECT_EQ(both.statistics["pages"], 64);
+  for (const auto& [name, value] : both.shader.defines)
+    if (name == "AMRTEX_PAGE_CONSTANTS") {
+      EXPECT_EQ(value, 0);
+    }
+}
+
 // ---- the table ----
 
 TEST(PageTable, LayoutFillsAnEntryWithoutOverlap) {

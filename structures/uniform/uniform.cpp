@@ -20,14 +20,17 @@ struct Plan {
   int level;
   Vec3i cells;
   Vec3i blocks;
+  int fields;
   bool validity;
   bool ranges;
   int border;  ///< texels round the domain: the fills of cells outside, which clamping gives only where no cell is missing
   Box texels() const { return Box{Vec3i(0), cells}.grown(border); }
   std::int64_t cell_count() const { return std::int64_t{cells.x} * cells.y * cells.z; }
   std::int64_t block_count() const { return std::int64_t{blocks.x} * blocks.y * blocks.z; }
+  /// Words of validity bits: each field's from a new word.
+  std::int64_t validity_words() const { return fields * words_for_bits(cell_count()); }
   std::int64_t bytes(Storage storage) const {
-    return texels().cells() * texel_bytes(storage) + (validity ? 4 * words_for_bits(cell_count()) : 0) +
+    return fields * texels().cells() * texel_bytes(storage) + (validity ? 4 * validity_words() : 0) +
            (ranges ? 4 * block_count() : 0);
   }
 };
@@ -62,7 +65,8 @@ Plan Uniform::plan(const AmrHierarchy& h, const BuildRequest& request, const Jso
   p.level = level(parameters, h.finest_level());
   p.cells = h.cells(p.level);
   p.blocks = ceil_div(p.cells, kBlock);
-  p.validity = h.has_missing(request.field);
+  p.fields = request.field_count();
+  p.validity = any_missing(h, request);
   p.ranges = request.needs.value_ranges;
   p.border = p.validity && request.needs.filter != Filter::nearest ? 1 : 0;
   const std::int64_t bytes = p.bytes(request.storage);
@@ -72,57 +76,126 @@ Plan Uniform::plan(const AmrHierarchy& h, const BuildRequest& request, const Jso
     throw UnsupportedError(fmt::format(
         "encoding uniform: level {} has {} x {} x {} cells ({} bytes), a 3D texture of this context at most {} along an axis",
         p.level, p.cells.x, p.cells.y, p.cells.z, bytes, limit));
-  if (p.validity && 4 * words_for_bits(p.cell_count()) > request.context.max_buffer_bytes)
+  if (p.validity && 4 * p.validity_words() > request.context.max_buffer_bytes)
     throw UnsupportedError(fmt::format("encoding uniform: validity bits take {} bytes, a buffer of this context at most {}",
-                                       4 * words_for_bits(p.cell_count()), request.context.max_buffer_bytes));
+                                       4 * p.validity_words(), request.context.max_buffer_bytes));
   return p;
 }
 
-/// Writes one block: values, validity bits, range.
-struct Writer {
-  const AmrHierarchy& hierarchy;
-  const BuildRequest& request;
-  const Plan& plan;
-  StorageScale scale;
-  double range_origin;
-  HostTexture& values;
-  HostTexture* ranges;
+/// What the blocks are written to.
+struct Storages {
+  std::vector<HostTexture> values;  ///< one a field
+  HostTexture validity;             ///< without data where every cell has a value
+  HostTexture ranges;               ///< without data where no region is skipped
+};
 
-  void block(const Vec3i& b, std::vector<std::uint8_t>& missing_cells) const {
-    const Box inner = intersection(Box{b * kBlock, (b + Vec3i(1)) * kBlock}, hierarchy.domain(plan.level));
-    const int border = request.needs.filter == Filter::nearest ? 0 : 1;
-    const Box box = inner.grown(border);
+/// Writes the blocks of the structure: values, which cells are missing, ranges.
+class Writer {
+ public:
+  Writer(const AmrHierarchy& h, const BuildRequest& request, const Plan& plan, const EncodedField& field, Storages& out)
+      : hierarchy_(h), request_(request), plan_(plan), field_(field), out_(out) {
+    if (plan.validity) missing_.resize(static_cast<std::size_t>(plan.fields * plan.cell_count()));
+  }
+
+  void block(const Vec3i& b) {
+    bool mesh = false;
+    std::uint32_t range = kVacantRange;
+    for (int number = 0; number < plan_.fields; ++number) {
+      const Contents contents = write_values(b, number);
+      mesh = mesh || contents.any;
+      if (number == 0 && contents.any) range = encode_range(contents.range, field_.range_origin, request_.storage, field_.scale);
+    }
+    if (plan_.ranges) out_.ranges.as<std::uint32_t>()[Box{Vec3i(0), plan_.blocks}.offset(b)] = mesh ? range : kNoRange;
+  }
+
+  /// When all blocks are written: one bit for each of their bytes, which threads do not share.
+  void write_validity() const {
+    if (missing_.empty()) return;
+    const std::uint8_t* missing = missing_.data();
+    std::uint32_t* words = out_.validity.as<std::uint32_t>();
+    for (int number = 0; number < plan_.fields; ++number) {
+      for (std::int64_t i = 0; i < plan_.cell_count(); ++i)
+        if (missing[i] == 0) set_bit(words, i);
+      missing += plan_.cell_count();
+      words += words_for_bits(plan_.cell_count());
+    }
+  }
+  std::int64_t host_bytes() const { return static_cast<std::int64_t>(missing_.size()); }
+
+ private:
+  struct Contents {
+    ValueRange range;  ///< of the cells, the layer around them and their fills
+    bool any = false;  ///< has any cell a value?
+  };
+
+  Contents write_values(const Vec3i& b, int number) {
+    const Box inner = intersection(Box{b * kBlock, (b + Vec3i(1)) * kBlock}, hierarchy_.domain(plan_.level));
+    const Box box = inner.grown(request_.needs.filter == Filter::nearest ? 0 : 1);
     std::vector<double> v(static_cast<std::size_t>(box.cells()));
     std::vector<std::uint8_t> missing(v.size());
-    filled_level_values(hierarchy, request.field, plan.level, box, v, missing);
-    const Box all = hierarchy.domain(plan.level);
-    ValueRange range;
+    filled_level_values(hierarchy_, request_.field_at(number), plan_.level, box, v, missing);
+    Contents contents;
+    contents.any = mark_missing(inner, box, missing, number);
+    for (double value : v) contents.range.add(value);
+    store(inner, box, v, number);
+    return contents;
+  }
+
+  /// Has any cell of the block a value?
+  bool mark_missing(const Box& inner, const Box& box, std::span<const std::uint8_t> missing, int number) {
+    const Box all = hierarchy_.domain(plan_.level);
+    const std::size_t first = static_cast<std::size_t>(number) * static_cast<std::size_t>(plan_.cell_count());
     bool any = false;
     for_each_cell(inner, [&](const Vec3i& c) {
       const bool none = missing[box.offset(c)] != 0;
       any = any || !none;
-      if (!missing_cells.empty()) missing_cells[all.offset(c)] = none ? 1 : 0;
+      if (!missing_.empty()) missing_[first + all.offset(c)] = none ? 1 : 0;
     });
-    for (double value : v) range.add(value);
-    // a block at the domain's boundary writes the border there
-    const Box texels = plan.texels();
+    return any;
+  }
+
+  /// A block at the domain's boundary stores the border there.
+  void store(const Box& inner, const Box& box, std::span<const double> v, int number) {
+    const Box all = hierarchy_.domain(plan_.level);
+    const Box texels = plan_.texels();
     Box own = inner;
     for (int a = 0; a < 3; ++a) {
       if (own.lower[a] == all.lower[a]) own.lower[a] = texels.lower[a];
       if (own.upper[a] == all.upper[a]) own.upper[a] = texels.upper[a];
     }
+    HostTexture& texture = out_.values[static_cast<std::size_t>(number)];
+    const StorageScale scale = field_.scale_of(number);
     for (int z = own.lower.z; z < own.upper.z; ++z)
       for (int y = own.lower.y; y < own.upper.y; ++y)
-        store_values(request.storage, scale, &v[box.offset({own.lower.x, y, z})], static_cast<std::size_t>(own.size().x),
-                     values.data.data(), texels.offset({own.lower.x, y, z}));
-    if (ranges != nullptr)
-      ranges->as<std::uint32_t>()[Box{Vec3i(0), plan.blocks}.offset(b)] =
-          encode_range(any ? range : ValueRange{}, range_origin, request.storage, scale);
+        store_values(request_.storage, scale, &v[box.offset({own.lower.x, y, z})], static_cast<std::size_t>(own.size().x),
+                     texture.data.data(), texels.offset({own.lower.x, y, z}));
   }
+
+  const AmrHierarchy& hierarchy_;
+  const BuildRequest& request_;
+  const Plan& plan_;
+  const EncodedField& field_;
+  Storages& out_;
+  std::vector<std::uint8_t> missing_;  ///< a byte a cell of each field
 };
+
+Storages make_storages(const Plan& p, const EncodedField& field) {
+  Storages out;
+  for (int number = 0; number < p.fields; ++number) {
+    HostTexture& t = out.values.emplace_back(make_texture(element_name("tex_dense", number), field.storage, p.texels().size()));
+    t.hardware_linear = field.filtering == Filtering::hardware;
+    t.holds_values = true;
+    t.roles.payload = p.cell_count() * texel_bytes(field.storage);
+    t.roles.duplicated = t.bytes() - t.roles.payload;
+  }
+  if (p.validity) out.validity = make_buffer("dense_validity", TexelFormat::r32ui, p.validity_words());
+  if (p.ranges) out.ranges = make_buffer("dense_ranges", TexelFormat::r32ui, p.block_count());
+  return out;
+}
 
 EncodedField Uniform::build(const AmrHierarchy& h, const BuildRequest& request) const {
   require_filter(*this, request.needs.filter);
+  require_fields(*this, h, request);
   const Json parameters = complete_parameters(*this, request.parameters);
   const Plan p = plan(h, request, parameters);
   EncodedField field = start_field(*this, h, request, parameters);
@@ -132,34 +205,24 @@ EncodedField Uniform::build(const AmrHierarchy& h, const BuildRequest& request) 
   field.shader.defines.emplace_back("AMRTEX_DENSE_BORDER", p.border);
   field.integer_uniforms = {{"u_dense_cells", p.cells}, {"u_dense_blocks", p.blocks}};
 
-  HostTexture values = make_texture("tex_dense", request.storage, p.texels().size());
-  values.hardware_linear = field.filtering == Filtering::hardware;
-  values.holds_values = true;
-  values.roles.payload = p.cell_count() * texel_bytes(request.storage);
-  values.roles.duplicated = values.bytes() - values.roles.payload;
-  HostTexture validity =
-      p.validity ? make_buffer("dense_validity", TexelFormat::r32ui, words_for_bits(p.cell_count())) : HostTexture{};
-  HostTexture ranges = p.ranges ? make_buffer("dense_ranges", TexelFormat::r32ui, p.block_count()) : HostTexture{};
-
-  std::vector<std::uint8_t> missing(p.validity ? static_cast<std::size_t>(p.cell_count()) : 0);
-  const Writer writer{h, request, p, field.scale, field.range_origin, values, p.ranges ? &ranges : nullptr};
+  Storages out = make_storages(p, field);
+  Writer writer(h, request, p, field, out);
   tbb::parallel_for(std::int64_t{0}, p.block_count(), [&](std::int64_t i) {
     const auto x = static_cast<int>(i % p.blocks.x);
     const auto y = static_cast<int>(i / p.blocks.x % p.blocks.y);
     const auto z = static_cast<int>(i / p.blocks.x / p.blocks.y);
-    writer.block({x, y, z}, missing);
+    writer.block({x, y, z});
   });
-  for (std::size_t i = 0; i < missing.size(); ++i)
-    if (missing[i] == 0) set_bit(validity.as<std::uint32_t>(), static_cast<std::int64_t>(i));
+  writer.write_validity();
 
-  field.host_peak_bytes = p.bytes(request.storage) + static_cast<std::int64_t>(missing.size());
-  field.textures.push_back(std::move(values));
+  field.host_peak_bytes = p.bytes(request.storage) + writer.host_bytes();
+  field.textures = std::move(out.values);
   if (p.validity)
-    field.textures.push_back(std::move(validity));
+    field.textures.push_back(std::move(out.validity));
   else
-    field.left_out.push_back({"validity bits", "every cell has a value", 4 * words_for_bits(p.cell_count())});
+    field.left_out.push_back({"validity bits", "every cell has a value", 4 * p.validity_words()});
   if (p.ranges)
-    field.textures.push_back(std::move(ranges));
+    field.textures.push_back(std::move(out.ranges));
   else
     field.left_out.push_back({"value ranges", "no region is skipped", 4 * p.block_count()});
   field.statistics = {{"blocks", p.block_count()}};

@@ -1,4 +1,4 @@
-// uniform: locate() is arithmetic, fetch_field() one fetch of the dense texture.
+// uniform: locate() is arithmetic, fetch_value() one fetch of a dense texture.
 #include "uniform/uniform_layout.h"
 #if !AMRTEX_CPP
 #ifndef AMRTEX_DENSE_LEVEL
@@ -11,11 +11,11 @@
 DEFINE_INT(AMRTEX_DENSE_LEVEL)
 DEFINE_INT(AMRTEX_DENSE_BORDER)
 
-VALUE_TEXTURE(tex_dense)
+VALUE_TEXTURES(tex_dense, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)
 UNIFORM(ivec3, u_dense_cells)   // cells of the level
 UNIFORM(ivec3, u_dense_blocks)  // regions along each axis
 #if AMRTEX_CPP || AMRTEX_VALIDITY
-BUFFER(uint, dense_validity, dense_validity_block)  // one bit a cell, x fastest
+BUFFER(uint, dense_validity, dense_validity_block)  // one bit a cell, x fastest; each field from a new word
 #endif
 #if AMRTEX_CPP || AMRTEX_VALUE_RANGES
 BUFFER(uint, dense_ranges, dense_ranges_block)  // coded value range a block
@@ -51,34 +51,37 @@ bool locate(IN(Position) p, OUT(Region) r) {
   return true;
 }
 
-real dense_texel(IN(ivec3) cell) {
+real dense_texel(IN(int) field, IN(ivec3) cell) {
   ivec3 last = u_dense_cells + ivec3(2 * AMRTEX_DENSE_BORDER - 1);
-  return texelFetch(tex_dense, clamp(cell + ivec3(AMRTEX_DENSE_BORDER), ivec3(0), last), 0).x;
+  return texelFetch(tex_dense[field], clamp(cell + ivec3(AMRTEX_DENSE_BORDER), ivec3(0), last), 0).x;
 }
 
 #if AMRTEX_CPP || AMRTEX_VALIDITY
-bool dense_has_value(IN(ivec3) cell) {
+bool dense_has_value(IN(int) field, IN(ivec3) cell) {
   ivec3 c = clamp(cell, ivec3(0), u_dense_cells - ivec3(1));
   uint bit = uint(c.x) + uint(u_dense_cells.x) * (uint(c.y) + uint(u_dense_cells.y) * uint(c.z));
-  return ((dense_validity[bit >> 5u] >> (bit & 31u)) & 1u) != 0u;
+  uint last = uint(u_dense_cells.x) * uint(u_dense_cells.y) * uint(u_dense_cells.z) - 1u;
+  uint first_word = uint(field) * ((last >> 5u) + 1u);
+  return ((dense_validity[first_word + (bit >> 5u)] >> (bit & 31u)) & 1u) != 0u;
 }
 #endif
 
-real fetch_field(IN(Region) r, IN(vec3r) q) {
+real fetch_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
   ivec3 first = ivec3(r.handle.x, r.handle.y, r.handle.z);
 #if AMRTEX_CPP || AMRTEX_VALIDITY
-  if (AMRTEX_VALIDITY != 0 && !dense_has_value(first + ivec3(floor(q)))) return no_value();
+  if (AMRTEX_VALIDITY != 0 && !dense_has_value(field, first + ivec3(floor(q)))) return no_value();
 #endif
-  if (AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) return decode_value(dense_texel(first + ivec3(floor(q))));
+  if (AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) return decode_value(dense_texel(field, first + ivec3(floor(q))), field);
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
-  return decode_value(textureLod(tex_dense, r.texture_lower + q * r.texture_scale, 0.0).x);
+  return decode_value(textureLod(tex_dense[field], r.texture_lower + q * r.texture_scale, 0.0).x, field);
 #else
   PRECISE vec3r from_centre = q - vec3r(0.5);
   vec3r whole = floor(from_centre);
   vec3r f = from_centre - whole;
   ivec3 i = first + ivec3(whole);
-  return decode_value(trilinear(dense_texel(i), dense_texel(i + ivec3(1, 0, 0)), dense_texel(i + ivec3(0, 1, 0)),
-                                dense_texel(i + ivec3(1, 1, 0)), dense_texel(i + ivec3(0, 0, 1)), dense_texel(i + ivec3(1, 0, 1)),
-                                dense_texel(i + ivec3(0, 1, 1)), dense_texel(i + ivec3(1, 1, 1)), f));
+  return decode_value(trilinear(dense_texel(field, i), dense_texel(field, i + ivec3(1, 0, 0)), dense_texel(field, i + ivec3(0, 1, 0)),
+                                dense_texel(field, i + ivec3(1, 1, 0)), dense_texel(field, i + ivec3(0, 0, 1)),
+                                dense_texel(field, i + ivec3(1, 0, 1)), dense_texel(field, i + ivec3(0, 1, 1)),
+                                dense_texel(field, i + ivec3(1, 1, 1)), f), field);
 #endif
 }

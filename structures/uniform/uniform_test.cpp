@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "structures/build_tools.hpp"
 #include "structures/uniform/uniform_layout.h"
 #include "tests/encoding_cases.hpp"
 
@@ -32,6 +33,19 @@ TEST(Uniform, HasOneTexelAFinestCellAndOneRangeABlock) {
   EXPECT_EQ(field.left_out[0].what, "validity bits");
   EXPECT_EQ(field.left_out[0].bytes, 80 * 8 * 8 / 8);
   EXPECT_EQ(uniform_field(h, Filter::linear_page, {}, {.storage = Storage::r8}).find("tex_dense")->bytes(), 80 * 8 * 8);
+}
+
+TEST(Uniform, ABlockHasNoMeshOnlyWhereNoFieldHasAValue) {
+  // 64 x 16 x 16 finest cells, two blocks; the first field has no value in the lower one
+  const AmrHierarchy h = fields_with_gaps().hierarchy();
+  const EncodedField alone = uniform_field(h, Filter::nearest);
+  const EncodedField both = uniform_field(h, Filter::nearest, {}, {.more_fields = {1}});
+  const auto ranges = [](const EncodedField& f) { return f.find("dense_ranges")->as<std::uint32_t>(); };
+  EXPECT_EQ(ranges(alone)[0], kNoRange);
+  EXPECT_EQ(ranges(both)[0], kVacantRange);
+  EXPECT_EQ(ranges(both)[1], ranges(alone)[1]) << "ranges are those of the first field";
+  EXPECT_EQ(both.find("dense_validity")->texels(), 2 * 64 * 16 * 16 / 32);
+  EXPECT_EQ(both.find("tex_dense[1]")->size, both.find("tex_dense")->size);
 }
 
 TEST(Uniform, LeavesRangesOutWhereNothingIsSkipped) {
