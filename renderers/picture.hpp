@@ -9,7 +9,7 @@
 
 namespace amrtex {
 
-/// Linear values, first row on top. 4 channels: premultiplied RGBA (mode dvr);
+/// Linear values, first row on top. 4 channels: premultiplied RGBA, or a normal and 1;
 /// 1 channel: the raw value of the modes projection and mip. Pictures of the GL
 /// context hold floats exactly.
 struct Picture {

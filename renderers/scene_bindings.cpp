@@ -128,7 +128,7 @@ int bisections(const RenderSettings& s) {
 /// Optical depth of a surface; of an opaque one so much that nothing is left.
 double surface_depth(double opacity) { return opacity < 1 ? -std::log1p(-opacity) : 1e4; }
 
-void add_surfaces(const Scene& scene, SceneBindings& b) {
+void add_surfaces(const Scene& scene, const EncodedField& field, SceneBindings& b) {
   const Isosurfaces& iso = scene.settings.isosurfaces;
   validate(iso);
   std::vector<double> light;
@@ -147,6 +147,8 @@ void add_surfaces(const Scene& scene, SceneBindings& b) {
   if (map.color.size() > kMostPoints)
     throw UsageError(fmt::format("surfaces coloured by the field '{}': {} colour points; at most {} are supported",
                                  iso.color_field, map.color.size(), kMostPoints));
+  if (mapped && field.field_count < 2)
+    throw Error(fmt::format("surfaces coloured by the field '{}': the structure was built without it", iso.color_field));
   if (mapped) b.uniforms.push_back({"u_surface_points", color_points(map)});
   b.defines.emplace_back("AMRTEX_SURFACE_POINTS", mapped ? static_cast<int>(map.color.size()) : 0);
   b.defines.emplace_back("AMRTEX_SURFACE_LOGARITHMIC", mapped && map.logarithmic ? 1 : 0);
@@ -227,7 +229,7 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
                {"AMRTEX_SKIP", s.skip ? 1 : 0},
                {"AMRTEX_EARLY_END", s.early_end && s.draws_volume() ? 1 : 0},
                {"AMRTEX_ISOVALUES", s.draws_surfaces() ? static_cast<int>(s.isosurfaces.values.size()) : 0}};
-  if (s.draws_surfaces()) add_surfaces(scene, b);
+  if (s.draws_surfaces()) add_surfaces(scene, field, b);
   return b;
 }
 

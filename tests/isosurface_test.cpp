@@ -212,6 +212,38 @@ TEST(Surfaces, AreLitByTheAngleBetweenTheirGradientAndTheRay) {
   });
 }
 
+TEST(Surfaces, TakeTheColorOfASecondField) {
+  // f = x, g = y: on the plane x = 1/2 the colour is (y, 0, 1 - y), inside the outer cells' centres
+  MeshDescription mesh = MeshBuilder(Vec3i(16)).root(along_x).description();
+  mesh.fields.push_back("g");
+  mesh.levels[0][0].values.push_back(
+      MeshBuilder(Vec3i(16)).root([](const Vec3d& p) { return p.y; }).description().levels[0][0].values[0]);
+  const AmrHierarchy h(mesh);
+  Scene scene = iso_scene(orthographic(Vec3d(0.5), {1, 0.3, -0.2}, 0.5), {0.5});
+  scene.settings.isosurfaces.shading = Shading::none;
+  scene.settings.isosurfaces.color_field = "g";
+  scene.settings.isosurfaces.color = {{0, {0, 0, 1}}, {1, {1, 0, 0}}};
+  for_each_filter([&](const EncodingCase& c) {
+    if (!holds_linear(c.filter)) return;
+    BuildRequest request;
+    request.more_fields = {1};
+    request.needs.filter = c.filter;
+    request.parameters = c.parameters;
+    const EncodedField field = c.encoding->build(h, request);
+    const Picture reference = HierarchyReference(h, 0, field.definition).render(scene, 0.1);
+    for (const Picture& picture :
+         {render_on_cpu(h, field, scene, true), draw(context(ContextKind::egl), h, field, scene), reference})
+      for (int y = 0; y < kSize; ++y)
+        for (int x = 0; x < kSize; ++x) {
+          const WorldRay ray = ray_of(scene, x, y);
+          const double g = (ray.origin + (0.5 - ray.origin.x) / ray.direction.x * ray.direction).y;
+          ASSERT_NEAR(picture.pixel(x, y)[0], g, 1e-5);
+          ASSERT_NEAR(picture.pixel(x, y)[2], 1 - g, 1e-5);
+        }
+    EXPECT_THROW(draw(context(ContextKind::egl), h, build(h, c), scene), Error) << "it was built without the second field";
+  });
+}
+
 // ---- spheres and tori: order of convergence ----
 
 struct Body {
