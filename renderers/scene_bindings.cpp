@@ -17,6 +17,16 @@ constexpr std::size_t kMostInvisibleRanges = 8;
 /// then rays are held in double and positions are rounded once more in each region.
 constexpr int kFloatRayCells = 2048;
 
+/// a, b of each field.
+std::vector<double> value_scales(const EncodedField& field) {
+  std::vector<double> scales;
+  for (int i = 0; i < field.field_count; ++i) {
+    const StorageScale s = field.scale_of(i);
+    scales.insert(scales.end(), {s.offset, s.scale});
+  }
+  return scales;
+}
+
 double smallest_edge(const AmrHierarchy& h) {
   const Vec3d s = h.spacing(h.finest_level());
   return std::min({s.x, s.y, s.z});
@@ -111,16 +121,6 @@ void add_camera(const AmrHierarchy& h, const Scene& scene, UniformValues& unifor
   uniforms.push_back({"u_draw_lower", numbers(lower), true});
   uniforms.push_back({"u_draw_upper", numbers(upper), true});
   uniforms.push_back({"u_picture_size", std::vector<double>{static_cast<double>(s.width), static_cast<double>(s.height)}});
-}
-
-/// a, b of each field.
-std::vector<double> value_scales(const EncodedField& field) {
-  std::vector<double> scales;
-  for (int i = 0; i < field.field_count; ++i) {
-    const StorageScale s = field.scale_of(i);
-    scales.insert(scales.end(), {s.offset, s.scale});
-  }
-  return scales;
 }
 
 }  // namespace
