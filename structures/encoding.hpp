@@ -111,8 +111,8 @@ struct EncodedField {
 };
 
 struct BuildRequest {
-  int field = 0;                 ///< the drawn one: number 0 of the contract
-  std::vector<int> more_fields;  ///< beside it, with values at the same places: numbers 1, 2, ...
+  int field = 0;
+  std::vector<int> more_fields;  ///< fetched beside `field`, at the same places
   Storage storage = Storage::r32f;
   SceneNeeds needs;
   Json parameters = Json::object();                                      ///< unknown keys are an error

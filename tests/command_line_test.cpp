@@ -400,6 +400,33 @@ TEST_F(CommandLine, RenderOfAValueHasOneChannelAndAColorBar) {
   EXPECT_GT(big_endian(read_text(at("a.png")), 16), 32) << "the bar stands beside the picture";
 }
 
+TEST_F(CommandLine, RenderDrawsSurfacesColoredByASecondField) {
+  Json scene = with(one_point(), "render", {{"mode", "iso"}, {"isovalues", {0.3}}, {"width", 32}, {"height", 32}});
+  scene["datasets"] = {
+      {"generate", {{"field", "blobs"}, {"levels", 2}, {"root", 16}, {"patch", 4}, {"more_fields", {"linear"}}}}};
+  EXPECT_EQ(amrtex({"render", experiment_file(scene), "-o", at("a.npy")}).exit_code, 0);
+  scene["render"]["color_field"] = "linear";
+  const Result drawn = amrtex({"render", experiment_file(scene), "-o", at("b.npy")});
+  EXPECT_EQ(drawn.exit_code, 0) << drawn.err;
+  const Picture a = read_npy(at("a.npy"));
+  const Picture b = read_npy(at("b.npy"));
+  EXPECT_GT(*std::max_element(a.values.begin(), a.values.end()), 0.1);
+  EXPECT_NE(a.values, b.values);
+  scene["render"]["color_field"] = "pressure";
+  expect_complaint(amrtex({"render", experiment_file(scene), "-o", at("c.npy")}), 2,
+                   AllOf(HasSubstr("pressure"), HasSubstr("blobs"), HasSubstr("linear")));
+  EXPECT_FALSE(fs::exists(at("c.npy")));
+}
+
+TEST_F(CommandLine, AnIsovalueOutsideTheRangeIsAnEmptyPictureAndAWarning) {
+  Json scene = with(one_point(), "render", {{"mode", "iso"}, {"isovalues", {1e9}}, {"width", 16}, {"height", 16}});
+  const Result r = amrtex({"render", experiment_file(scene), "-o", at("a.npy")});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.err, AllOf(HasSubstr("warning"), HasSubstr("isovalue"), HasSubstr("range of")));
+  const Picture picture = read_npy(at("a.npy"));
+  EXPECT_EQ(*std::max_element(picture.values.begin(), picture.values.end()), 0);
+}
+
 TEST_F(CommandLine, RenderRefusesWhatIsNoSceneOrNoPicture) {
   const std::string axes = experiment_file(small_experiment());
   expect_complaint(amrtex({"render", axes, "-o", at("a.png")}), 2, HasSubstr("encodings"));

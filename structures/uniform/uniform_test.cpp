@@ -43,6 +43,7 @@ TEST(Uniform, ABlockHasNoMeshOnlyWhereNoFieldHasAValue) {
   const auto ranges = [](const EncodedField& f) { return f.find("dense_ranges")->as<std::uint32_t>(); };
   EXPECT_EQ(ranges(alone)[0], kNoRange);
   EXPECT_EQ(ranges(both)[0], kVacantRange);
+  EXPECT_GT(kVacantRange << 16, kVacantRange & 0xffff0000U) << "bits of floats: the minimum is above the maximum";
   EXPECT_EQ(ranges(both)[1], ranges(alone)[1]) << "ranges are those of the first field";
   EXPECT_EQ(both.find("dense_validity")->texels(), 2 * 64 * 16 * 16 / 32);
   EXPECT_EQ(both.find("tex_dense[1]")->size, both.find("tex_dense")->size);
