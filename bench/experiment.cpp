@@ -34,8 +34,8 @@ constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osm
 /// How many lists deep one value of this key is; what lies deeper is an axis.
 int value_depth(std::string_view key) {
   if (key == "extinction" || key == "color" || key == "surface_color") return 2;
-  constexpr std::array<std::string_view, 9> lists = {"eye",         "at",   "up",    "isovalues",  "iso_opacity",
-                                                     "clip_planes", "root", "ratio", "skip_levels"};
+  constexpr std::array<std::string_view, 10> lists = {"more_fields", "eye",         "at",   "up",    "isovalues",
+                                                      "iso_opacity", "clip_planes", "root", "ratio", "skip_levels"};
   return std::find(lists.begin(), lists.end(), key) != lists.end() ? 1 : 0;
 }
 

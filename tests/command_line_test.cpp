@@ -402,6 +402,7 @@ TEST_F(CommandLine, RenderOfAValueHasOneChannelAndAColorBar) {
 
 TEST_F(CommandLine, RenderDrawsSurfacesColoredByASecondField) {
   Json scene = with(one_point(), "render", {{"mode", "iso"}, {"isovalues", {0.3}}, {"width", 32}, {"height", 32}});
+  scene["render"]["surface_color"] = {{0, 1, 0, 0}, {1, 0, 0, 1}};
   scene["datasets"] = {
       {"generate", {{"field", "blobs"}, {"levels", 2}, {"root", 16}, {"patch", 4}, {"more_fields", {"linear"}}}}};
   EXPECT_EQ(amrtex({"render", experiment_file(scene), "-o", at("a.npy")}).exit_code, 0);
