@@ -111,7 +111,33 @@ real trilinear(IN(real) v0, IN(real) v1, IN(real) v2, IN(real) v3, IN(real) v4, 
   return z;
 }
 
+// The eight values between which f is trilinear about q, in an encoding whose regions are single leaf
+// cells: they stay the same while q stays in one octant of its cell.
+STRUCT Stencil {
+  vec4r lower;  // corners 0 to 3, as texels hold them
+  vec4r upper;  // corners 4 to 7
+};
+
+// Octant of the cell [0, 1)^3 that holds q.
+ivec3 stencil_octant(IN(vec3r) q) { return ivec3(greaterThanEqual(q, vec3r(0.5))); }
+
+real stencil_value(IN(Stencil) s, IN(ivec3) octant, IN(vec3r) q) {
+  PRECISE vec3r from_first = q + vec3r(0.5);
+  PRECISE vec3r f = from_first - vec3r(octant);
+  return decode_value(trilinear(s.lower.x, s.lower.y, s.lower.z, s.lower.w, s.upper.x, s.upper.y, s.upper.z, s.upper.w, f));
+}
+
 #include AMRTEX_ENCODING_FILE
+
+// Optional: every region is one leaf cell. Then fetch_field has one value in it (nearest), or is
+// stencil_value() of what fetch_stencil(r, octant, s) gives (linear), and the march fetches once for many samples.
+#ifndef AMRTEX_CELL_REGIONS
+#define AMRTEX_CELL_REGIONS false
+void fetch_stencil(IN(Region) r, IN(ivec3) octant, OUT(Stencil) s) {
+  s.lower = vec4r(0);
+  s.upper = vec4r(0);
+}
+#endif
 
 bool region_contains(IN(Region) r, IN(ivec3) cell) {
   return all(greaterThanEqual(cell, r.lower)) && all(lessThan(cell, r.upper));

@@ -60,18 +60,27 @@ void add_compensated(INOUT(Accumulation) a, IN(real) amount) {
   a.sum = t;
 }
 
+// One interval of emitted colour (rgb) and optical depth (w).
+void add_light(INOUT(Accumulation) a, IN(vec4r) light) {
+  add_compensated(a, light.w);
+  real transmittance = min(exp(-a.sum), a.transmittance);
+  PRECISE vec3r color = a.color + vec3r(light.x, light.y, light.z) * (a.transmittance - transmittance);
+  a.color = color;
+  a.transmittance = transmittance;
+}
+
+// Colour and optical depth of an interval of one value.
+vec4r interval_light(IN(real) value, IN(real) length) {
+  vec4r light = transfer(value);
+  PRECISE real depth = min(light.w * length, real(1e4));  // exp(-1e4) is 0; infinity would become NaN
+  return vec4r(light.x, light.y, light.z, depth);
+}
+
 // One interval of the exponential midpoint rule: `value` at its middle, `length` in units.
 void accumulate(INOUT(Accumulation) a, IN(real) value, IN(real) length) {
   if (AMRTEX_MODE == AMRTEX_MODE_DVR) {
-    vec4r light = transfer(value);
-    if (light.w > real(0)) {
-      PRECISE real depth = min(light.w * length, real(1e4));  // exp(-1e4) is 0; infinity would become NaN
-      add_compensated(a, depth);
-      real transmittance = min(exp(-a.sum), a.transmittance);
-      PRECISE vec3r color = a.color + vec3r(light.x, light.y, light.z) * (a.transmittance - transmittance);
-      a.color = color;
-      a.transmittance = transmittance;
-    }
+    vec4r light = interval_light(value, length);
+    if (light.w > real(0)) add_light(a, light);
   } else if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION) {
     PRECISE real part = value * length;
     add_compensated(a, part);
@@ -95,6 +104,29 @@ void take_sample(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q, IN(real) leng
   if (AMRTEX_COUNT != 0) a.counted.x += 1;
   if (AMRTEX_VALIDITY != 0 && is_no_value(value)) return;
   accumulate(a, value, length);
+}
+
+// Many intervals of one length in a region of one value: what take_sample does with each, in
+// the same order, so that the bits are the same; but one fetch and one transfer for all.
+void take_constant_samples(INOUT(Accumulation) a, IN(Region) r, IN(real) count, IN(real) length) {
+  real value = fetch_field(r, vec3r(0.5));
+  if (AMRTEX_COUNT != 0) a.counted.x += int(count);
+  if (AMRTEX_VALIDITY != 0 && is_no_value(value)) return;
+  vec4r light = vec4r(1);
+  if (AMRTEX_MODE == AMRTEX_MODE_DVR) light = interval_light(value, length);
+  real i = real(0);
+  if (light.w > real(0)) {
+    do {
+      if (AMRTEX_MODE == AMRTEX_MODE_DVR) add_light(a, light);
+      else accumulate(a, value, length);
+      i += real(1);
+    } while (i < count && AMRTEX_MODE != AMRTEX_MODE_MIP && !ray_ended(a));
+  }
+}
+
+void take_stencil_sample(INOUT(Accumulation) a, IN(Stencil) s, IN(ivec3) octant, IN(vec3r) q, IN(real) length) {
+  if (AMRTEX_COUNT != 0) a.counted.x += 1;
+  accumulate(a, stencil_value(s, octant, q), length);
 }
 
 void count_region(INOUT(Accumulation) a, IN(bool) skipped) {
@@ -190,8 +222,34 @@ vec3r lattice_q(IN(LatticeBlock) block, IN(LatticeFrame) frame, IN(Region) r, IN
   return q_large;
 }
 
+// Regions that are leaf cells: values are fetched once an octant that the ray passes.
+void march_lattice_cell(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(LatticeFrame) frame, IN(Region) r, IN(real) first, IN(real) end) {
+  real i = first;
+  vec3r q = lattice_q(block, frame, r, i);
+  do {
+    ivec3 octant = stencil_octant(q);
+    Stencil s;
+    fetch_stencil(r, octant, s);
+    bool same = true;
+    do {
+      take_stencil_sample(a, s, octant, q, u_step);
+      i += real(1);
+      q = lattice_q(block, frame, r, i);
+      same = all(equal(stencil_octant(q), octant));
+    } while (same && i < end && !ray_ended(a));
+  } while (i < end && !ray_ended(a));
+}
+
 void march_lattice_region(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(Region) r, IN(int) first, IN(int) next) {
+  if (AMRTEX_CELL_REGIONS && AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) {
+    take_constant_samples(a, r, real(next - first), u_step);
+    return;
+  }
   LatticeFrame frame = lattice_frame(block, r);
+  if (AMRTEX_CELL_REGIONS) {
+    march_lattice_cell(a, block, frame, r, real(first), real(next));
+    return;
+  }
   real i = real(first);
   real end = real(next);
   if (i < end) {
@@ -280,12 +338,37 @@ Position leave_region(IN(Ray) ray, IN(Region) r, IN(ray_real) t, IN(bvec3) throu
   return p;
 }
 
+void march_adaptive_cell(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(vec3r) dq, IN(real) count, IN(real) interval) {
+  real i = real(0.5);
+  vec3r q = q0 + dq * i;
+  do {
+    ivec3 octant = stencil_octant(q);
+    Stencil s;
+    fetch_stencil(r, octant, s);
+    bool same = true;
+    do {
+      take_stencil_sample(a, s, octant, q, interval);
+      i += real(1);
+      q = q0 + dq * i;
+      same = all(equal(stencil_octant(q), octant));
+    } while (same && i < count && !ray_ended(a));
+  } while (i < count && !ray_ended(a));
+}
+
 void march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(vec3r) direction, IN(real) length) {
   real inverse_width = real(1) / real(r.width);
   real count = max(ceil(length * inverse_width / u_step - real(1e-4)), real(1));
   real interval = length / count;
+  if (AMRTEX_CELL_REGIONS && AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) {
+    take_constant_samples(a, r, count, interval);
+    return;
+  }
   vec3r q0 = f * inverse_width;
   vec3r dq = direction * (interval * inverse_width);
+  if (AMRTEX_CELL_REGIONS) {
+    march_adaptive_cell(a, r, q0, dq, count, interval);
+    return;
+  }
   real i = real(0.5);
   if (i < count) {
     do {

@@ -1,0 +1,297 @@
+// octree: regions are leaf cells, found by a descent from the root or from a dense start grid. Words: octree_layout.h.
+#include "octree/octree_layout.h"
+#if !AMRTEX_CPP
+#ifndef AMRTEX_OCTREE_LAYOUT
+#error AMRTEX_OCTREE_LAYOUT must be defined: AMRTEX_OCTREE_WIDE or AMRTEX_OCTREE_RGBA8
+#endif
+#ifndef AMRTEX_OCTREE_TRAVERSAL
+#error AMRTEX_OCTREE_TRAVERSAL must be defined: AMRTEX_OCTREE_FAST or AMRTEX_OCTREE_PAPER
+#endif
+#ifndef AMRTEX_OCTREE_NODE_BUFFER
+#error AMRTEX_OCTREE_NODE_BUFFER must be defined: 1 where nodes stand in a buffer, 0 where in a 3D texture
+#endif
+#ifndef AMRTEX_OCTREE_VALUE_BUFFER
+#error AMRTEX_OCTREE_VALUE_BUFFER must be defined: 1 where values stand in a buffer, 0 where in a 3D texture
+#endif
+#ifndef AMRTEX_OCTREE_LOD
+#error AMRTEX_OCTREE_LOD must be defined: 1 where averages stand in a LOD texture of their own
+#endif
+#ifndef AMRTEX_OCTREE_START
+#error AMRTEX_OCTREE_START must be defined: 1 where there is a start grid, else 0
+#endif
+#ifndef AMRTEX_OCTREE_START_SHIFT
+#error AMRTEX_OCTREE_START_SHIFT must be defined: depths from the cells where a descent starts to level 0
+#endif
+#ifndef AMRTEX_OCTREE_GHOSTS
+#error AMRTEX_OCTREE_GHOSTS must be defined: 1 where missing neighbours stand in the tree, 0 where there are none
+#endif
+#endif
+DEFINE_INT(AMRTEX_OCTREE_LAYOUT)
+DEFINE_INT(AMRTEX_OCTREE_TRAVERSAL)
+DEFINE_INT(AMRTEX_OCTREE_NODE_BUFFER)
+DEFINE_INT(AMRTEX_OCTREE_VALUE_BUFFER)
+DEFINE_INT(AMRTEX_OCTREE_LOD)
+DEFINE_INT(AMRTEX_OCTREE_START)
+DEFINE_INT(AMRTEX_OCTREE_START_SHIFT)
+DEFINE_INT(AMRTEX_OCTREE_GHOSTS)
+
+// what the march may use (contract.glsl); the paper's traversal pays its eight descents every sample
+#define AMRTEX_CELL_REGIONS (AMRTEX_OCTREE_TRAVERSAL == AMRTEX_OCTREE_FAST)
+
+#if AMRTEX_CPP || AMRTEX_OCTREE_NODE_BUFFER
+BUFFER(uint, octree_nodes, octree_nodes_block)
+#endif
+#if AMRTEX_CPP || !AMRTEX_OCTREE_NODE_BUFFER
+INTEGER_TEXTURE(tex_octree_nodes)
+#endif
+#if AMRTEX_CPP || (AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_WIDE && AMRTEX_OCTREE_VALUE_BUFFER)
+BUFFER(real, octree_values, octree_values_block)
+#endif
+#if AMRTEX_CPP || (AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_WIDE && !AMRTEX_OCTREE_VALUE_BUFFER)
+VALUE_TEXTURE(tex_octree_values)
+#endif
+#if AMRTEX_CPP || AMRTEX_OCTREE_LOD
+VALUE_TEXTURE(tex_octree_lod)  // one texel a node
+#endif
+#if AMRTEX_CPP || AMRTEX_OCTREE_START
+BUFFER(uint, octree_start, octree_start_block)
+UNIFORM(ivec3, u_octree_start)  // cells of the start grid
+#endif
+#if AMRTEX_CPP || (AMRTEX_VALIDITY && AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_WIDE)
+BUFFER(uint, octree_validity, octree_validity_block)  // one bit a slot: a leaf with a value
+#endif
+#if AMRTEX_CPP || (AMRTEX_VALUE_RANGES && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST)
+BUFFER(uint, octree_ranges, octree_ranges_block)  // one code a node: of all that its leaves can return
+#endif
+UNIFORM(ivec3, u_octree_shift)  // log2 of nodes along x and y of their 3D textures
+
+// ---- addresses. Tree space: finest cells from the tree's lower corner, unsigned, since ghosts
+// of a domain of 31 bits need the 32nd.
+
+uvec3 octree_from_finest(IN(ivec3) cell) {
+  if (AMRTEX_OCTREE_GHOSTS == 0) return uvec3(cell);
+  return uvec3(cell) + uvec3(uint(level_width(0)));  // one cell of level 0 before the domain
+}
+
+// Which child of a node whose children are 2^shift wide.
+int octree_octant(IN(uvec3) c, IN(int) shift) {
+  uvec3 bit = (c >> uvec3(uint(shift))) & uvec3(1u);
+  return int(bit.x | (bit.y << 1u) | (bit.z << 2u));
+}
+
+ivec3 octree_node_texel(IN(int) node) {
+  return ivec3(node & ((1 << u_octree_shift.x) - 1), (node >> u_octree_shift.x) & ((1 << u_octree_shift.y) - 1),
+               node >> (u_octree_shift.x + u_octree_shift.y));
+}
+
+ivec3 octree_slot_texel(IN(int) slot) {
+  return octree_node_texel(slot >> 3) * 2 + ivec3(slot & 1, (slot >> 1) & 1, (slot >> 2) & 1);
+}
+
+// ---- nodes
+
+// The word that tells of a slot: its node's (wide) or its own (rgba8).
+uint octree_word(IN(int) slot) {
+  bool own = AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_RGBA8;
+#if AMRTEX_CPP || AMRTEX_OCTREE_NODE_BUFFER
+  if (AMRTEX_OCTREE_NODE_BUFFER != 0) return octree_nodes[own ? slot : slot >> 3];
+#endif
+#if AMRTEX_CPP || !AMRTEX_OCTREE_NODE_BUFFER
+  return texelFetch(tex_octree_nodes, own ? octree_slot_texel(slot) : octree_node_texel(slot >> 3), 0).x;
+#endif
+}
+
+bool octree_is_inner(IN(uint) word, IN(int) slot) {
+  if (AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_RGBA8) return (word >> 24u) == uint(AMRTEX_OCTREE_INNER);
+  return ((word >> uint(slot & 7)) & 1u) != 0u;
+}
+
+// The node in a slot that is inner.
+int octree_child_node(IN(uint) word, IN(int) slot) {
+  if (AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_RGBA8)
+    return int((word & 255u) | (((word >> 8u) & 255u) << uint(u_octree_shift.x)) |
+               (((word >> 16u) & 255u) << uint(u_octree_shift.x + u_octree_shift.y)));
+  return int(word >> uint(AMRTEX_OCTREE_MASK_BITS)) + int(bitCount(word & ((1u << uint(slot & 7)) - 1u)));
+}
+
+// What a texel of storage holds for a slot; decode_value makes it a value.
+real octree_stored(IN(int) slot) {
+  if (AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_RGBA8) return real(octree_word(slot) & 255u) / real(255);
+#if AMRTEX_CPP || (AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_WIDE && AMRTEX_OCTREE_VALUE_BUFFER)
+  if (AMRTEX_OCTREE_VALUE_BUFFER != 0) return octree_values[slot];
+#endif
+#if AMRTEX_CPP || (AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_WIDE && !AMRTEX_OCTREE_VALUE_BUFFER)
+  return texelFetch(tex_octree_values, octree_slot_texel(slot), 0).x;
+#endif
+  return real(0);
+}
+
+// ---- descents
+
+// The slot where a descent to c starts, and log2 of its cell's width in finest cells.
+int octree_begin(IN(uvec3) c, OUT(int) shift) {
+  shift = findLSB(level_width(0)) + AMRTEX_OCTREE_START_SHIFT;
+#if AMRTEX_CPP || AMRTEX_OCTREE_START
+  if (AMRTEX_OCTREE_START != 0) {
+    ivec3 g = ivec3(c >> uvec3(uint(shift)));
+    uint entry = octree_start[g.x + u_octree_start.x * (g.y + u_octree_start.y * g.z)];
+    shift += int(entry >> uint(AMRTEX_OCTREE_SLOT_BITS));
+    return int(entry & ((1u << uint(AMRTEX_OCTREE_SLOT_BITS)) - 1u));
+  }
+#endif
+  return octree_octant(c, shift);
+}
+
+// Descends to the leaf that holds c.
+int octree_find(IN(uvec3) c, OUT(int) shift) {
+  int slot = octree_begin(c, shift);
+  bool inner = false;
+  do {
+    uint word = octree_word(slot);
+    inner = octree_is_inner(word, slot);
+    if (inner) {
+      shift -= 1;
+      slot = octree_child_node(word, slot) * 8 + octree_octant(c, shift);
+    }
+  } while (inner && shift > 0);
+  return slot;
+}
+
+int octree_level(IN(int) shift) {
+  if (AMRTEX_RATIO_SHIFT != 0) return max(AMRTEX_LEVELS - 1 - shift / AMRTEX_RATIO_SHIFT, 0);
+  int level = 0;
+  for (int l = 1; l < AMRTEX_LEVELS; ++l) level += level_width(l) >= (1 << shift) ? 1 : 0;
+  return level;
+}
+
+bool octree_has_value(IN(int) slot) {
+  if (AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_RGBA8) return (octree_word(slot) >> 24u) == uint(AMRTEX_OCTREE_LEAF);
+#if AMRTEX_CPP || (AMRTEX_VALIDITY && AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_WIDE)
+  return ((octree_validity[slot >> 5] >> uint(slot & 31)) & 1u) != 0u;
+#endif
+  return true;
+}
+
+// Empty cells are of any power of two and may overhang the domain.
+void octree_empty_region(IN(uvec3) c, IN(int) shift, INOUT(Region) r) {
+  uvec3 origin = octree_from_finest(ivec3(0));
+  uvec3 lower = max((c >> uvec3(uint(shift))) << uvec3(uint(shift)), origin);
+  // sizes as offsets from c, so that no bit is lost in domains of 31 bits
+  uvec3 rest = (uvec3(1u) << uvec3(uint(shift))) - (c & ((uvec3(1u) << uvec3(uint(shift))) - uvec3(1u)));
+  r.lower = ivec3(lower - origin);
+  r.upper = ivec3(min(c - origin + rest, uvec3(u_domain_cells)));
+  r.width = min(r.width, 1 << min(shift, 30));
+}
+
+real octree_leaf_value(IN(Region) r) {
+  // the octant follows from where the region lies
+  return decode_value(octree_stored(r.handle.x * 8 + octree_octant(octree_from_finest(r.lower), findLSB(r.width))));
+}
+
+bool locate(IN(Position) p, OUT(Region) r) {
+  int shift = 0;
+  uvec3 c = octree_from_finest(p.cell);
+  int slot = octree_find(c, shift);
+  r.level = octree_level(shift);
+  r.width = level_width(r.level);
+  r.lower = p.cell & ivec3(-r.width);
+  r.upper = r.lower + ivec3(r.width);
+  r.value_range = vec2r(0);
+  r.handle = ivec4(slot >> 3, shift, 0, 0);
+  bool inside = true;
+  if (AMRTEX_VALIDITY != 0) {
+    inside = octree_has_value(slot);
+    if (!inside) octree_empty_region(c, shift, r);
+  }
+  if (AMRTEX_VALUE_RANGES != 0) {
+    if (AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) {
+      if (inside) r.value_range = vec2r(octree_leaf_value(r));
+    }
+#if AMRTEX_CPP || (AMRTEX_VALUE_RANGES && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST)
+    else r.value_range = decode_range(octree_ranges[r.handle.x]);
+#endif
+  }
+  return inside;
+}
+
+// ---- the eight values of linear_lod
+
+// Corner i of the stencil between cells `low` and `high` of one depth.
+uvec3 octree_corner(IN(uvec3) low, IN(uvec3) high, IN(int) i) {
+  return uvec3((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y, (i & 4) != 0 ? high.z : low.z);
+}
+
+// What stands in a slot as seen from the depth of its cells: sample of a leaf, average of an inner node.
+real octree_depth_value(IN(int) slot) {
+#if AMRTEX_CPP || AMRTEX_OCTREE_LOD
+  if (AMRTEX_OCTREE_LOD != 0) {
+    uint word = octree_word(slot);
+    if (octree_is_inner(word, slot)) return texelFetch(tex_octree_lod, octree_node_texel(octree_child_node(word, slot)), 0).x;
+  }
+#endif
+  return octree_stored(slot);
+}
+
+// One full descent: level value at c of the depth whose cells are 2^shift wide.
+real octree_descend(IN(uvec3) c, IN(int) shift) {
+  int at = 0;
+  int slot = octree_begin(c, at);
+  bool inner = true;
+  if (at > shift) {
+    do {
+      uint word = octree_word(slot);
+      inner = octree_is_inner(word, slot);
+      if (inner) {
+        at -= 1;
+        slot = octree_child_node(word, slot) * 8 + octree_octant(c, at);
+      }
+    } while (inner && at > shift);
+  }
+  return octree_depth_value(slot);
+}
+
+void fetch_stencil(IN(Region) r, IN(ivec3) octant, OUT(Stencil) s) {
+  int shift = r.handle.y;
+  ivec3 first = r.lower + (octant - ivec3(1)) * r.width;
+  ivec3 second = r.lower + octant * r.width;
+  if (AMRTEX_OCTREE_GHOSTS == 0) {  // outside the domain the fill is the nearest cell's value
+    first = max(first, ivec3(0));
+    second = min(second, u_domain_cells - ivec3(1));
+  }
+  uvec3 low = octree_from_finest(first);
+  uvec3 high = octree_from_finest(second);
+  real v[8];
+  if (AMRTEX_OCTREE_TRAVERSAL == AMRTEX_OCTREE_PAPER) {
+    for (int i = 0; i < 8; ++i) v[i] = octree_descend(octree_corner(low, high, i), shift);
+  } else {
+    int slot[8];
+    int at = 0;
+    for (int i = 0; i < 8; ++i) slot[i] = octree_begin(octree_corner(low, high, i), at);
+    // all eight go down together: where one meets a leaf it stays
+    at = findLSB(level_width(0)) + AMRTEX_OCTREE_START_SHIFT;
+    if (at > shift) {
+      do {
+        at -= 1;
+        for (int i = 0; i < 8; ++i) {
+          uint word = octree_word(slot[i]);
+          int child = octree_child_node(word, slot[i]) * 8 + octree_octant(octree_corner(low, high, i), at);
+          slot[i] = octree_is_inner(word, slot[i]) ? child : slot[i];
+        }
+      } while (at > shift);
+    }
+    for (int i = 0; i < 8; ++i) v[i] = octree_depth_value(slot[i]);
+  }
+  s.lower = vec4r(v[0], v[1], v[2], v[3]);
+  s.upper = vec4r(v[4], v[5], v[6], v[7]);
+}
+
+real fetch_field(IN(Region) r, IN(vec3r) q) {
+  if (AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) {
+    if (AMRTEX_VALUE_RANGES != 0) return r.value_range.x;
+    return octree_leaf_value(r);
+  }
+  Stencil s;
+  ivec3 octant = stencil_octant(q);
+  fetch_stencil(r, octant, s);
+  return stencil_value(s, octant, q);
+}
