@@ -222,34 +222,12 @@ vec3r lattice_q(IN(LatticeBlock) block, IN(LatticeFrame) frame, IN(Region) r, IN
   return q_large;
 }
 
-// Regions that are leaf cells: values are fetched once an octant that the ray passes.
-void march_lattice_cell(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(LatticeFrame) frame, IN(Region) r, IN(real) first, IN(real) end) {
-  real i = first;
-  vec3r q = lattice_q(block, frame, r, i);
-  do {
-    ivec3 octant = stencil_octant(q);
-    Stencil s;
-    fetch_stencil(r, octant, s);
-    bool same = true;
-    do {
-      take_stencil_sample(a, s, octant, q, u_step);
-      i += real(1);
-      q = lattice_q(block, frame, r, i);
-      same = all(equal(stencil_octant(q), octant));
-    } while (same && i < end && !ray_ended(a));
-  } while (i < end && !ray_ended(a));
-}
-
 void march_lattice_region(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(Region) r, IN(int) first, IN(int) next) {
   if (AMRTEX_CELL_REGIONS && AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) {
     take_constant_samples(a, r, real(next - first), u_step);
     return;
   }
   LatticeFrame frame = lattice_frame(block, r);
-  if (AMRTEX_CELL_REGIONS) {
-    march_lattice_cell(a, block, frame, r, real(first), real(next));
-    return;
-  }
   real i = real(first);
   real end = real(next);
   if (i < end) {
@@ -266,7 +244,35 @@ vec3r safe_inverse(IN(vec3r) v) {
   return real(1) / (v + tiny);
 }
 
+// Samples from i on for which the eight values about sample i hold; returns the first that needs others.
+int march_lattice_stencil(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(Region) r, IN(int) first, IN(int) count) {
+  LatticeFrame frame = lattice_frame(block, r);
+  real i = real(first);
+  real end = real(count);
+  vec3r q = lattice_q(block, frame, r, i);
+  ivec3 octant = stencil_octant(q);
+  Stencil s;
+  fetch_stencil(r, octant, s);
+  bool holds = true;
+  do {
+    take_stencil_sample(a, s, octant, q, u_step);
+    i += real(1);
+    q = lattice_q(block, frame, r, i);
+    holds = stencil_holds(s, octant, q);
+  } while (holds && i < end && !ray_ended(a));
+  return int(i);
+}
+
+Position lattice_position(IN(LatticeBlock) block, IN(real) i) {
+  Position p;
+  vec3r offset = lattice_offset(block, i) * AMRTEX_QUANTUM;
+  p.cell = clamp(block.cell + ivec3(floor(offset)), ivec3(0), u_domain_cells - ivec3(1));
+  p.fraction = offset - floor(offset);
+  return p;
+}
+
 void march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) count) {
+  bool stencils = AMRTEX_CELL_REGIONS && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST;  // their own cells decide where they end
   vec3r inverse_step = safe_inverse(block.step);
   int i = 0;
   if (i < count) {
@@ -276,16 +282,13 @@ void march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) 
       bool skipped = true;
       do {  // the next region that can be seen: all lanes of a SIMD group then sample together
         first = i;
-        Position p;
-        vec3r offset = lattice_offset(block, real(i)) * AMRTEX_QUANTUM;
-        p.cell = clamp(block.cell + ivec3(floor(offset)), ivec3(0), u_domain_cells - ivec3(1));
-        p.fraction = offset - floor(offset);
-        bool inside = locate(p, r);
-        i = lattice_exit(block, inverse_step, r, i, count);
+        bool inside = locate(lattice_position(block, real(i)), r);
         skipped = !inside || region_invisible(a, r);
+        if (skipped || !stencils) i = lattice_exit(block, inverse_step, r, i, count);
         count_region(a, skipped);
       } while (skipped && i < count);
-      if (!skipped) march_lattice_region(a, block, r, first, i);
+      if (stencils && !skipped) i = march_lattice_stencil(a, block, r, first, count);
+      if (!stencils && !skipped) march_lattice_region(a, block, r, first, i);
     } while (i < count && !ray_ended(a));
   }
 }

@@ -21,7 +21,7 @@ constexpr std::int64_t kMostNodes = std::int64_t{1} << AMRTEX_OCTREE_INDEX_BITS;
 /// Subtrees from this depth on are built in parallel.
 constexpr int kSubtreeDepth = 5;
 /// A start grid chosen by us is at most this part of the tree.
-constexpr std::int64_t kStartGridShare = 16;
+constexpr std::int64_t kStartGridShare = 12;
 constexpr int kPaperAddressBits = 8;  ///< an axis
 constexpr int kAutomatic = -1;
 constexpr const char* kStartGridAccepted = "\"auto\", 0 (none), or a power of two from 2 to 1024";
@@ -73,7 +73,8 @@ struct Plan {
   bool ranges = false;
   NodeTexture texture;
   Vec3i start{0};                ///< cells of the start grid; 0: none
-  int start_shift = 0;           ///< depths from the cells where a descent starts to level 0
+  int start_shift = 0;  ///< depths from the cells where a descent starts to level 0
+  bool start_slots = false;  ///< the start grid knows where its cells' averages stand
   std::int64_t node_slots = 0;   ///< room for nodes in the texture, or their number in a buffer
   std::int64_t value_slots = 0;  ///< the same for the value texture
   std::int64_t node_words = 0;
@@ -152,7 +153,7 @@ struct Mean {
 
 /// What the nodes are written to.
 struct Stores {
-  HostTexture nodes, values, lod, validity, start, ranges;
+  HostTexture nodes, values, lod, validity, start, start_slots, ranges;
 };
 
 /// Writes nodes in depth-first order. One object a thread.
@@ -381,21 +382,24 @@ int octant_of(const Vec3l& c, int shift) {
   return static_cast<int>(bit.x | (bit.y << 1) | (bit.z << 2));
 }
 
-void write_start_grid(const Tree& tree, const TreeReader& reader, const Plan& plan, HostTexture& start) {
+void write_start_grid(const Tree& tree, const TreeReader& reader, const Plan& plan, Stores& stores) {
   const int shift = tree.level_0_shift + plan.start_shift;
-  auto* entries = start.as<std::uint32_t>();
+  auto* entries = stores.start.as<std::uint32_t>();
+  auto* slots = plan.start_slots ? stores.start_slots.as<std::uint32_t>() : nullptr;
   tbb::parallel_for(0, plan.start.z, [&](int z) {
     for_each_cell({Vec3i(0, 0, z), Vec3i(plan.start.x, plan.start.y, z + 1)}, [&](const Vec3i& g) {
       const Vec3l c = Vec3l(g) << static_cast<std::int64_t>(shift);
-      int at = tree.root.shift - 1;
-      std::int64_t slot = octant_of(c, at);
-      while (at > shift) {
-        const std::int64_t node = reader.child(slot);
-        if (node < 0) break;
+      int at = tree.root.shift;
+      std::int64_t slot = 0;
+      std::int64_t node = 0;
+      while (at > shift && node >= 0) {
         slot = 8 * node + octant_of(c, --at);
+        node = reader.child(slot);
       }
-      entries[Box{Vec3i(0), plan.start}.offset(g)] =
-          static_cast<std::uint32_t>(slot) | (static_cast<std::uint32_t>(at - shift) << AMRTEX_OCTREE_SLOT_BITS);
+      const std::size_t i = Box{Vec3i(0), plan.start}.offset(g);
+      const auto above = static_cast<std::uint32_t>(node >= 0 ? AMRTEX_OCTREE_START_INNER : at - shift);
+      entries[i] = static_cast<std::uint32_t>(node >= 0 ? node : slot) | (above << AMRTEX_OCTREE_SLOT_BITS);
+      if (slots != nullptr) slots[i] = static_cast<std::uint32_t>(slot);
     });
   });
 }
@@ -570,19 +574,20 @@ void Octree::require_support(const AmrHierarchy& h, const BuildRequest& request,
 /// so that no cell that a filter looks for is wider than the grid's.
 void plan_start_grid(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Tree& tree,
                      std::int64_t tree_bytes, Plan& p) {
-  const int coarsest = tree.root.shift - 1 - tree.level_0_shift;
+  const int coarsest = tree.root.shift - tree.level_0_shift;
   p.start_shift = coarsest;
   if (o.paper_traversal || o.start_grid == 0) return;
   const Vec3l cells = Vec3l(h.cells(0)) + Vec3l(tree.ghosts ? 2 : 0);
-  for (int shift = 0; shift <= coarsest; ++shift) {
+  for (int shift = 0; shift < coarsest; ++shift) {
     const Vec3l n = (cells + Vec3l((std::int64_t{1} << shift) - 1)) >> static_cast<std::int64_t>(shift);
     const std::int64_t longest = std::max({n.x, n.y, n.z});
     if (longest > 1024) continue;  // three axes stay in 31 bits
-    const std::int64_t bytes = 4 * n.x * n.y * n.z;
+    const std::int64_t bytes = 4 * n.x * n.y * n.z * (p.averages_in_slots ? 2 : 1);
     if (bytes > request.context.max_buffer_bytes) continue;
     if (o.start_grid == kAutomatic ? bytes * kStartGridShare > tree_bytes : longest > o.start_grid) continue;
     p.start = Vec3i(n);
     p.start_shift = shift;
+    p.start_slots = p.averages_in_slots;
     return;
   }
 }
@@ -622,7 +627,7 @@ Plan Octree::plan(const AmrHierarchy& h, const BuildRequest& request, const Opti
   std::int64_t tree_bytes = 4 * p.node_slots * (p.node_words / tree.nodes);
   if (!o.paper_layout) tree_bytes += 8 * p.value_slots * value_bytes;
   plan_start_grid(h, request, o, tree, tree_bytes, p);
-  p.bytes = tree_bytes + 4 * p.start_cells();
+  p.bytes = tree_bytes + (p.start_slots ? 8 : 4) * p.start_cells();
   if (p.lod_texture) p.bytes += in_texture * value_bytes;
   if (p.validity) p.bytes += 4 * words_for_bits(8 * tree.nodes);
   if (p.ranges) p.bytes += 4 * tree.nodes;
@@ -646,6 +651,7 @@ Stores allocate(const BuildRequest& request, const Options& o, const Tree& tree,
   if (p.lod_texture) s.lod = make_texture("tex_octree_lod", request.storage, nodes);
   if (p.validity) s.validity = make_buffer("octree_validity", TexelFormat::r32ui, words_for_bits(8 * tree.nodes));
   if (p.start_cells() > 0) s.start = make_buffer("octree_start", TexelFormat::r32ui, p.start_cells());
+  if (p.start_slots) s.start_slots = make_buffer("octree_start_slots", TexelFormat::r32ui, p.start_cells());
   if (p.ranges) s.ranges = make_buffer("octree_ranges", TexelFormat::r32ui, tree.nodes);
   return s;
 }
@@ -673,7 +679,7 @@ void set_roles(const Options& o, const Tree& tree, const Plan& p, const Counts& 
 Json statistics(const Tree& tree, const Plan& p, const Counts& counts) {
   Json json;
   json["nodes"] = tree.nodes;
-  json["depths"] = tree.root.shift - tree.level_0_shift;
+  json["depths"] = tree.root.shift;
   json["leaves"] = counts.leaves;
   json["empty"] = counts.empty;
   json["start_grid"] = p.start_cells() > 0 ? Json{p.start.x, p.start.y, p.start.z} : Json(nullptr);
@@ -720,7 +726,7 @@ EncodedField Octree::build(const AmrHierarchy& h, const BuildRequest& request) c
   Stores stores = allocate(request, o, tree, p);
   write_tree(h, request, tree, o, p, field.scale, subtrees, stores);
   const TreeReader reader(stores, o, p);
-  if (p.start_cells() > 0) write_start_grid(tree, reader, p, stores.start);
+  if (p.start_cells() > 0) write_start_grid(tree, reader, p, stores);
   if (p.ranges) write_ranges(h, request, tree, reader, field, stores.ranges);
   const std::int64_t leaves = h.leaf_cells() - h.statistics(request.field).cells_without_value;
   const Counts counts{leaves, tree.nodes - 1, 7 * tree.nodes + 1 - leaves};
@@ -728,7 +734,7 @@ EncodedField Octree::build(const AmrHierarchy& h, const BuildRequest& request) c
   field.statistics = statistics(tree, p, counts);
   field.left_out = left_out(request, tree, p, h.has_missing(request.field));
   add_shader_inputs(o, p, tree, field);
-  for (HostTexture* t : {&stores.nodes, &stores.values, &stores.lod, &stores.validity, &stores.start, &stores.ranges})
+  for (HostTexture* t : {&stores.nodes, &stores.values, &stores.lod, &stores.validity, &stores.start, &stores.start_slots, &stores.ranges})
     if (!t->data.empty()) field.textures.push_back(std::move(*t));
   const std::int64_t working = p.ranges ? tree.nodes * static_cast<std::int64_t>(sizeof(ValueRange)) : 0;
   field.host_peak_bytes = field.memory().total() + working + static_cast<std::int64_t>(subtrees.size() * sizeof(Subtree));

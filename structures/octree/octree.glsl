@@ -57,6 +57,9 @@ VALUE_TEXTURE(tex_octree_lod)  // one texel a node
 BUFFER(uint, octree_start, octree_start_block)
 UNIFORM(ivec3, u_octree_start)  // cells of the start grid
 #endif
+#if AMRTEX_CPP || (AMRTEX_OCTREE_START && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST && !AMRTEX_OCTREE_LOD)
+BUFFER(uint, octree_start_slots, octree_start_slots_block)  // where the average of each cell of the start grid stands
+#endif
 #if AMRTEX_CPP || (AMRTEX_VALIDITY && AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_WIDE)
 BUFFER(uint, octree_validity, octree_validity_block)  // one bit a slot: a leaf with a value
 #endif
@@ -128,32 +131,47 @@ real octree_stored(IN(int) slot) {
 
 // ---- descents
 
-// The slot where a descent to c starts, and log2 of its cell's width in finest cells.
-int octree_begin(IN(uvec3) c, OUT(int) shift) {
-  shift = findLSB(level_width(0)) + AMRTEX_OCTREE_START_SHIFT;
+#define AMRTEX_OCTREE_SLOT_MASK ((1u << uint(AMRTEX_OCTREE_SLOT_BITS)) - 1u)
+
+// log2 of the width of the cells where descents start: those of the start grid, or the root.
+int octree_start_shift() { return findLSB(level_width(0)) + AMRTEX_OCTREE_START_SHIFT; }
+
+int octree_start_index(IN(uvec3) c, IN(int) shift) {
 #if AMRTEX_CPP || AMRTEX_OCTREE_START
-  if (AMRTEX_OCTREE_START != 0) {
-    ivec3 g = ivec3(c >> uvec3(uint(shift)));
-    uint entry = octree_start[g.x + u_octree_start.x * (g.y + u_octree_start.y * g.z)];
-    shift += int(entry >> uint(AMRTEX_OCTREE_SLOT_BITS));
-    return int(entry & ((1u << uint(AMRTEX_OCTREE_SLOT_BITS)) - 1u));
-  }
+  ivec3 g = ivec3(c >> uvec3(uint(shift)));
+  return g.x + u_octree_start.x * (g.y + u_octree_start.y * g.z);
+#else
+  return 0;
 #endif
-  return octree_octant(c, shift);
 }
 
-// Descends to the leaf that holds c.
+// Entry of the start grid; without one, of the root.
+uint octree_begin(IN(uvec3) c, IN(int) shift) {
+#if AMRTEX_CPP || AMRTEX_OCTREE_START
+  if (AMRTEX_OCTREE_START != 0) return octree_start[octree_start_index(c, shift)];
+#endif
+  return uint(AMRTEX_OCTREE_START_INNER) << uint(AMRTEX_OCTREE_SLOT_BITS);
+}
+
+// Slot of the leaf that holds c, and log2 of its width.
 int octree_find(IN(uvec3) c, OUT(int) shift) {
-  int slot = octree_begin(c, shift);
-  bool inner = false;
-  do {
-    uint word = octree_word(slot);
-    inner = octree_is_inner(word, slot);
-    if (inner) {
+  shift = octree_start_shift();
+  uint entry = octree_begin(c, shift);
+  int slot = int(entry & AMRTEX_OCTREE_SLOT_MASK);
+  int above = int(entry >> uint(AMRTEX_OCTREE_SLOT_BITS));
+  bool inner = above == AMRTEX_OCTREE_START_INNER;
+  if (inner) {
+    int node = slot;
+    do {
       shift -= 1;
-      slot = octree_child_node(word, slot) * 8 + octree_octant(c, shift);
-    }
-  } while (inner && shift > 0);
+      slot = node * 8 + octree_octant(c, shift);
+      uint word = octree_word(slot);
+      inner = octree_is_inner(word, slot);
+      node = octree_child_node(word, slot);
+    } while (inner && shift > 0);
+  } else {
+    shift += above;
+  }
   return slot;
 }
 
@@ -221,39 +239,47 @@ uvec3 octree_corner(IN(uvec3) low, IN(uvec3) high, IN(int) i) {
   return uvec3((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y, (i & 4) != 0 ? high.z : low.z);
 }
 
-// What stands in a slot as seen from the depth of its cells: sample of a leaf, average of an inner node.
-real octree_depth_value(IN(int) slot) {
+// Sample of a leaf, or average of an inner node, in `slot`; `node` is the inner node.
+real octree_depth_value(IN(int) slot, IN(int) node, IN(bool) inner) {
 #if AMRTEX_CPP || AMRTEX_OCTREE_LOD
   if (AMRTEX_OCTREE_LOD != 0) {
-    uint word = octree_word(slot);
-    if (octree_is_inner(word, slot)) return texelFetch(tex_octree_lod, octree_node_texel(octree_child_node(word, slot)), 0).x;
+    if (inner) return texelFetch(tex_octree_lod, octree_node_texel(node), 0).x;
   }
 #endif
   return octree_stored(slot);
 }
 
-// One full descent: level value at c of the depth whose cells are 2^shift wide.
+// The paper's way: a full descent from the root to the depth whose cells are 2^shift wide.
 real octree_descend(IN(uvec3) c, IN(int) shift) {
-  int at = 0;
-  int slot = octree_begin(c, at);
+  int at = octree_start_shift();
+  int node = 0;
+  int slot = 0;
   bool inner = true;
-  if (at > shift) {
-    do {
-      uint word = octree_word(slot);
-      inner = octree_is_inner(word, slot);
-      if (inner) {
-        at -= 1;
-        slot = octree_child_node(word, slot) * 8 + octree_octant(c, at);
-      }
-    } while (inner && at > shift);
-  }
-  return octree_depth_value(slot);
+  do {
+    at -= 1;
+    slot = node * 8 + octree_octant(c, at);
+    uint word = octree_word(slot);
+    inner = octree_is_inner(word, slot);
+    node = octree_child_node(word, slot);
+  } while (inner && at > shift);
+  return octree_depth_value(slot, node, inner);
+}
+
+// Slot in the parent of an inner cell of the start grid, where its average stands.
+int octree_average_slot(IN(uvec3) c, IN(int) shift) {
+#if AMRTEX_CPP || (AMRTEX_OCTREE_START && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST && !AMRTEX_OCTREE_LOD)
+  return int(octree_start_slots[octree_start_index(c, shift)]);
+#else
+  return 0;
+#endif
 }
 
 void fetch_stencil(IN(Region) r, IN(ivec3) octant, OUT(Stencil) s) {
   int shift = r.handle.y;
   ivec3 first = r.lower + (octant - ivec3(1)) * r.width;
   ivec3 second = r.lower + octant * r.width;
+  bvec3 before = lessThan(first, ivec3(0));
+  bvec3 behind = greaterThanEqual(second, u_domain_cells);
   if (AMRTEX_OCTREE_GHOSTS == 0) {  // outside the domain the fill is the nearest cell's value
     first = max(first, ivec3(0));
     second = min(second, u_domain_cells - ivec3(1));
@@ -261,25 +287,50 @@ void fetch_stencil(IN(Region) r, IN(ivec3) octant, OUT(Stencil) s) {
   uvec3 low = octree_from_finest(first);
   uvec3 high = octree_from_finest(second);
   real v[8];
+  s.leaves = 0u;
   if (AMRTEX_OCTREE_TRAVERSAL == AMRTEX_OCTREE_PAPER) {
     for (int i = 0; i < 8; ++i) v[i] = octree_descend(octree_corner(low, high, i), shift);
   } else {
+    // all eight go down together; one that meets a leaf stays there
     int slot[8];
-    int at = 0;
-    for (int i = 0; i < 8; ++i) slot[i] = octree_begin(octree_corner(low, high, i), at);
-    // all eight go down together: where one meets a leaf it stays
-    at = findLSB(level_width(0)) + AMRTEX_OCTREE_START_SHIFT;
-    if (at > shift) {
+    int node[8];
+    bool inner[8];
+    bool same[8];  // at the depth of the region, not above it
+    int at = octree_start_shift();
+    for (int i = 0; i < 8; ++i) {
+      uint entry = octree_begin(octree_corner(low, high, i), at);
+      slot[i] = int(entry & AMRTEX_OCTREE_SLOT_MASK);
+      node[i] = slot[i];
+      int above = int(entry >> uint(AMRTEX_OCTREE_SLOT_BITS));
+      inner[i] = above == AMRTEX_OCTREE_START_INNER;
+      same[i] = at == shift && above == 0;
+    }
+    if (at == shift) {  // the start grid's own depth
+      for (int i = 0; i < 8; ++i) {
+        if (inner[i] && AMRTEX_OCTREE_LOD == 0) slot[i] = octree_average_slot(octree_corner(low, high, i), at);
+      }
+    } else {
       do {
         at -= 1;
         for (int i = 0; i < 8; ++i) {
-          uint word = octree_word(slot[i]);
-          int child = octree_child_node(word, slot[i]) * 8 + octree_octant(octree_corner(low, high, i), at);
-          slot[i] = octree_is_inner(word, slot[i]) ? child : slot[i];
+          if (inner[i]) {
+            slot[i] = node[i] * 8 + octree_octant(octree_corner(low, high, i), at);
+            uint word = octree_word(slot[i]);
+            inner[i] = octree_is_inner(word, slot[i]);
+            node[i] = octree_child_node(word, slot[i]);
+            same[i] = at == shift && !inner[i];
+          }
         }
       } while (at > shift);
     }
-    for (int i = 0; i < 8; ++i) v[i] = octree_depth_value(slot[i]);
+    for (int i = 0; i < 8; ++i) {
+      v[i] = octree_depth_value(slot[i], node[i], inner[i]);
+      if (AMRTEX_VALIDITY != 0) {
+        if (same[i]) same[i] = octree_has_value(slot[i]);
+      }
+      bool outside = ((i & 1) != 0 ? behind.x : before.x) || ((i & 2) != 0 ? behind.y : before.y) || ((i & 4) != 0 ? behind.z : before.z);
+      s.leaves |= same[i] && !outside ? 1u << uint(i) : 0u;
+    }
   }
   s.lower = vec4r(v[0], v[1], v[2], v[3]);
   s.upper = vec4r(v[4], v[5], v[6], v[7]);

@@ -27,9 +27,11 @@
 #define AMRTEX_OCTREE_MASK_BITS 8
 #define AMRTEX_OCTREE_INDEX_BITS 24  // of a node
 
-// An entry of the start grid: the slot of the cell of the tree that fills the grid's cell, or of the
-// leaf that covers it, as many depths above as the upper bits tell.
+// An entry of the start grid: the inner node that fills the grid's cell, or the slot of the leaf that
+// covers it, as many depths above as the upper bits tell.
 //
 //   31          27 26                    0
-//   [ depths above | slot                  ]
+//   [ depths above | slot                  ]   leaf
+//   [ 31           | node                  ]   inner node
 #define AMRTEX_OCTREE_SLOT_BITS 27
+#define AMRTEX_OCTREE_START_INNER 31
