@@ -172,14 +172,29 @@ ivec3 lattice_cell(IN(LatticeBlock) block, IN(real) i) {
 
 // First sample after i of the block that lies outside the region, at most `count`.
 int lattice_exit(IN(LatticeBlock) block, IN(vec3r) inverse_step, IN(Region) r, IN(int) i, IN(int) count) {
-  vec3r to_lower = (vec3r(r.lower - block.cell) * AMRTEX_QUANTA - block.fraction) * inverse_step;
-  vec3r to_upper = (vec3r(r.upper - block.cell) * AMRTEX_QUANTA - block.fraction) * inverse_step;
-  vec3r far = max(to_lower, to_upper);
+  bvec3 up = greaterThanEqual(block.step, vec3r(0));
+  ivec3 face = ivec3(up.x ? r.upper.x : r.lower.x, up.y ? r.upper.y : r.lower.y, up.z ? r.upper.z : r.lower.z);
+  vec3r plane = vec3r(face - block.cell) * AMRTEX_QUANTA;
+  vec3r far = (plane - block.fraction) * inverse_step;
   real exit = min(min(far.x, far.y), min(far.z, real(count)));
   int next = clamp(int(ceil(exit - real(0.5))), i + 1, count);
-  // the division rounds; the samples' own cells decide
-  bool too_far = next > i + 1 && !region_contains(r, lattice_cell(block, real(next - 1)));
-  bool too_near = next < count && region_contains(r, lattice_cell(block, real(next)));
+  // the division rounds; where the samples lie decides
+  bool too_far = false;
+  bool too_near = false;
+#if AMRTEX_CPP || !AMRTEX_RAY_DOUBLE
+  if (AMRTEX_RAY_DOUBLE == 0) {
+    // Offsets and planes are whole numbers of quanta below 2^24. Inside is below the upper plane, or not below
+    // the lower one; beyond the domain's faces samples belong to the last cell.
+    vec3r sense = vec3r(up) * real(2) - vec3r(1);
+    ivec3 open = ivec3(equal(face, ivec3(up) * u_domain_cells));
+    vec3r bound = sense * plane + (vec3r(1) - vec3r(up)) + vec3r(open) * real(1e30);
+    too_far = next > i + 1 && any(greaterThanEqual(sense * lattice_offset(block, real(next - 1)), bound));
+    too_near = next < count && all(lessThan(sense * lattice_offset(block, real(next)), bound));
+    return next + (too_near ? 1 : 0) - (too_far ? 1 : 0);
+  }
+#endif
+  too_far = next > i + 1 && !region_contains(r, lattice_cell(block, real(next - 1)));
+  too_near = next < count && region_contains(r, lattice_cell(block, real(next)));
   return next + (too_near ? 1 : 0) - (too_far ? 1 : 0);
 }
 

@@ -73,8 +73,8 @@ struct Plan {
   bool ranges = false;
   NodeTexture texture;
   Vec3i start{0};                ///< cells of the start grid; 0: none
-  int start_shift = 0;  ///< depths from the cells where a descent starts to level 0
-  bool start_slots = false;  ///< the start grid knows where its cells' averages stand
+  int start_shift = 0;           ///< depths from the cells where a descent starts to level 0
+  bool start_slots = false;      ///< the start grid knows where its cells' averages stand
   std::int64_t node_slots = 0;   ///< room for nodes in the texture, or their number in a buffer
   std::int64_t value_slots = 0;  ///< the same for the value texture
   std::int64_t node_words = 0;
@@ -734,7 +734,8 @@ EncodedField Octree::build(const AmrHierarchy& h, const BuildRequest& request) c
   field.statistics = statistics(tree, p, counts);
   field.left_out = left_out(request, tree, p, h.has_missing(request.field));
   add_shader_inputs(o, p, tree, field);
-  for (HostTexture* t : {&stores.nodes, &stores.values, &stores.lod, &stores.validity, &stores.start, &stores.start_slots, &stores.ranges})
+  for (HostTexture* t :
+       {&stores.nodes, &stores.values, &stores.lod, &stores.validity, &stores.start, &stores.start_slots, &stores.ranges})
     if (!t->data.empty()) field.textures.push_back(std::move(*t));
   const std::int64_t working = p.ranges ? tree.nodes * static_cast<std::int64_t>(sizeof(ValueRange)) : 0;
   field.host_peak_bytes = field.memory().total() + working + static_cast<std::int64_t>(subtrees.size() * sizeof(Subtree));
