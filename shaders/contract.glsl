@@ -151,6 +151,11 @@ void fetch_stencil(IN(Region) r, IN(ivec3) octant, OUT(Stencil) s) {
 }
 #endif
 
+// Optional: `vec3r fetch_gradient(Region r, vec3r q)`, the stored gradient of f per cell width of r along each axis.
+#ifndef AMRTEX_FETCH_GRADIENT
+#define AMRTEX_FETCH_GRADIENT 0
+#endif
+
 bool region_contains(IN(Region) r, IN(ivec3) cell) {
   return all(greaterThanEqual(cell, r.lower)) && all(lessThan(cell, r.upper));
 }

@@ -54,6 +54,7 @@ struct SceneNeeds {
   Filter filter = Filter::nearest;
   Filtering filtering = Filtering::manual;
   bool value_ranges = true;  ///< regions are skipped by their value range
+  bool gradients = false;    ///< for shading; encodings that store none leave it to differences of f
 };
 
 struct LeftOut {

@@ -7,7 +7,7 @@
 
 #include <bit>
 #include <cmath>
-#include <cstring>
+#include <numbers>
 
 #include "octree_layout.h"
 #include "octree_mesh.hpp"
@@ -351,6 +351,13 @@ class TreeReader {
  public:
   TreeReader(const Stores& stores, const Options& options, const Plan& plan) : stores_(stores), options_(options), plan_(plan) {}
 
+  /// Texel of a slot's own word (layout `rgba8`).
+  std::size_t word_texel(std::int64_t slot) const {
+    if (plan_.node_buffer) return static_cast<std::size_t>(slot);
+    const Vec3i in_node(static_cast<int>(slot & 1), static_cast<int>((slot >> 1) & 1), static_cast<int>((slot >> 2) & 1));
+    return Box{Vec3i(0), stores_.nodes.size}.offset(plan_.texture.position(slot >> 3) * 2 + in_node);
+  }
+
   /// Node in a slot; -1 where the slot is no inner one.
   std::int64_t child(std::int64_t slot) const {
     const auto* words = stores_.nodes.as<std::uint32_t>();
@@ -358,8 +365,7 @@ class TreeReader {
     const Box all{Vec3i(0), stores_.nodes.size};
     const Vec3i position = plan_.texture.position(slot >> 3);
     if (options_.paper_layout) {
-      const Vec3i in_node(static_cast<int>(slot & 1), static_cast<int>((slot >> 1) & 1), static_cast<int>((slot >> 2) & 1));
-      const std::uint32_t word = words[buffer ? static_cast<std::size_t>(slot) : all.offset(position * 2 + in_node)];
+      const std::uint32_t word = words[word_texel(slot)];
       if (word >> 24 != AMRTEX_OCTREE_INNER) return -1;
       return (word & 255) | (((word >> 8) & 255) << plan_.texture.shift.x) |
              (((word >> 16) & 255) << (plan_.texture.shift.x + plan_.texture.shift.y));
@@ -506,6 +512,43 @@ void write_ranges(const AmrHierarchy& h, const BuildRequest& request, const Tree
   tbb::parallel_for(std::size_t{0}, of_node.size(), [&](std::size_t i) {
     codes[i] = encode_range(of_node[i], field.range_origin, request.storage, field.scale);
   });
+}
+
+// ---- gradients of the layout `rgba8`
+
+/// Polar angle and azimuth in 8 bits each (octree_layout.h).
+std::uint32_t direction_code(const Vec3d& g) {
+  const double size = glm::length(g);
+  if (!(size > 0) || !std::isfinite(size)) return 0;
+  constexpr double kPi = std::numbers::pi;
+  const auto polar = static_cast<std::uint32_t>(1 + std::lround(std::acos(std::clamp(g.z / size, -1.0, 1.0)) / kPi * 254));
+  const auto azimuth = static_cast<std::uint32_t>(std::lround(std::atan2(g.y, g.x) / (2 * kPi) * 256) & 255);
+  return (polar << 16) | (azimuth << 8);
+}
+
+/// Adds the direction of the central difference of the level values to each leaf.
+void write_gradients(const AmrHierarchy& h, const BuildRequest& request, const Tree& tree, const TreeReader& reader,
+                     HostTexture& nodes) {
+  for (int level = 0; level < h.level_count(); ++level) {
+    const int shift = std::countr_zero(static_cast<unsigned>(h.cell_width(level)));
+    const std::vector<PatchPart> parts = patch_parts(h.patches(level));
+    tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t k) {
+      const Box wide = parts[k].box.grown(1);
+      const Box& patch = h.patches(level)[parts[k].patch].box;
+      const auto mask = h.leaf_mask(level, static_cast<int>(parts[k].patch));
+      std::vector<double> v(static_cast<std::size_t>(wide.cells()));
+      filled_level_values(h, request.field, level, wide, v);
+      const auto slope = [&](const Vec3i& c, const Vec3i& d) { return v[wide.offset(c + d)] - v[wide.offset(c - d)]; };
+      for_each_node_of(tree, reader, shift, parts[k].box, [&](std::int64_t node, const Box& cells) {
+        for_each_cell(cells, [&](const Vec3i& c) {
+          if (mask[patch.offset(c)] == 0) return;
+          const std::uint32_t code = direction_code({slope(c, {1, 0, 0}), slope(c, {0, 1, 0}), slope(c, {0, 0, 1})});
+          const Vec3l tree_cell = Vec3l(c) - (tree.root.lower >> static_cast<std::int64_t>(shift));
+          nodes.as<std::uint32_t>()[reader.word_texel(8 * node + octant_of(tree_cell, 0))] |= code;
+        });
+      });
+    });
+  }
 }
 
 // ---- the encoding
@@ -727,6 +770,8 @@ EncodedField Octree::build(const AmrHierarchy& h, const BuildRequest& request) c
   write_tree(h, request, tree, o, p, field.scale, subtrees, stores);
   const TreeReader reader(stores, o, p);
   if (p.start_cells() > 0) write_start_grid(tree, reader, p, stores);
+  const bool gradients = o.paper_layout && request.needs.gradients;
+  if (gradients) write_gradients(h, request, tree, reader, stores.nodes);
   if (p.ranges) write_ranges(h, request, tree, reader, field, stores.ranges);
   const std::int64_t leaves = h.leaf_cells() - h.statistics(request.field).cells_without_value;
   const Counts counts{leaves, tree.nodes - 1, 7 * tree.nodes + 1 - leaves};
@@ -734,6 +779,7 @@ EncodedField Octree::build(const AmrHierarchy& h, const BuildRequest& request) c
   field.statistics = statistics(tree, p, counts);
   field.left_out = left_out(request, tree, p, h.has_missing(request.field));
   add_shader_inputs(o, p, tree, field);
+  field.shader.defines.emplace_back("AMRTEX_OCTREE_GRADIENTS", gradients ? 1 : 0);
   for (HostTexture* t :
        {&stores.nodes, &stores.values, &stores.lod, &stores.validity, &stores.start, &stores.start_slots, &stores.ranges})
     if (!t->data.empty()) field.textures.push_back(std::move(*t));

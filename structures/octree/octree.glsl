@@ -25,7 +25,11 @@
 #ifndef AMRTEX_OCTREE_GHOSTS
 #error AMRTEX_OCTREE_GHOSTS must be defined: 1 where missing neighbours stand in the tree, 0 where there are none
 #endif
+#ifndef AMRTEX_OCTREE_GRADIENTS
+#error AMRTEX_OCTREE_GRADIENTS must be defined: 1 where leaves hold the direction of their gradient, else 0
 #endif
+#endif
+DEFINE_INT(AMRTEX_OCTREE_GRADIENTS)
 DEFINE_INT(AMRTEX_OCTREE_LAYOUT)
 DEFINE_INT(AMRTEX_OCTREE_TRAVERSAL)
 DEFINE_INT(AMRTEX_OCTREE_NODE_BUFFER)
@@ -37,6 +41,12 @@ DEFINE_INT(AMRTEX_OCTREE_GHOSTS)
 
 // what the march may use (contract.glsl); the paper's traversal pays its eight descents every sample
 #define AMRTEX_CELL_REGIONS (AMRTEX_OCTREE_TRAVERSAL == AMRTEX_OCTREE_FAST)
+
+#if AMRTEX_CPP
+#define AMRTEX_FETCH_GRADIENT 1
+#else
+#define AMRTEX_FETCH_GRADIENT AMRTEX_OCTREE_GRADIENTS
+#endif
 
 #if AMRTEX_CPP || AMRTEX_OCTREE_NODE_BUFFER
 BUFFER(uint, octree_nodes, octree_nodes_block)
@@ -335,6 +345,45 @@ void fetch_stencil(IN(Region) r, IN(ivec3) octant, OUT(Stencil) s) {
   s.lower = vec4r(v[0], v[1], v[2], v[3]);
   s.upper = vec4r(v[4], v[5], v[6], v[7]);
 }
+
+// ---- gradients: the layout of the paper has room for a direction
+
+#if AMRTEX_FETCH_GRADIENT
+// Direction of a leaf's gradient, of length 1 or 0.
+vec3r octree_direction(IN(uint) word) {
+  real polar_code = real((word >> 16u) & 255u);
+  real polar = (polar_code - real(1)) * real(3.14159265358979 / 254.0);
+  real azimuth = real((word >> 8u) & 255u) * real(6.28318530717959 / 256.0);
+  vec3r direction = vec3r(sin(polar) * cos(azimuth), sin(polar) * sin(azimuth), cos(polar));
+  return (word >> 24u) == uint(AMRTEX_OCTREE_LEAF) && polar_code > real(0) ? direction : vec3r(0);
+}
+
+// The word of the leaf at the depth of cells 2^shift wide or above; 0 where there is none.
+uint octree_leaf_word(IN(uvec3) c, IN(int) shift) {
+  int at = 0;
+  int slot = octree_find(c, at);
+  return at >= shift ? octree_word(slot) : 0u;
+}
+
+// Optional part of the contract: the gradient of f per cell width of r; here its direction alone, of length 1
+// or 0. Under linear_lod the directions of the eight cells are interpolated; those that are divided or empty have
+// none and stand back.
+vec3r fetch_gradient(IN(Region) r, IN(vec3r) q) {
+  int shift = r.handle.y;
+  if (AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) return octree_direction(octree_leaf_word(octree_from_finest(r.lower), shift));
+  ivec3 octant = stencil_octant(q);
+  vec3r f = q + vec3r(0.5) - vec3r(octant);
+  uvec3 low = octree_from_finest(max(r.lower + (octant - ivec3(1)) * r.width, ivec3(0)));
+  uvec3 high = octree_from_finest(min(r.lower + octant * r.width, u_domain_cells - ivec3(1)));
+  vec3r sum = vec3r(0);
+  for (int i = 0; i < 8; ++i) {
+    real weight = ((i & 1) != 0 ? f.x : real(1) - f.x) * ((i & 2) != 0 ? f.y : real(1) - f.y) * ((i & 4) != 0 ? f.z : real(1) - f.z);
+    sum += octree_direction(octree_leaf_word(octree_corner(low, high, i), shift)) * weight;
+  }
+  real size = length(sum);
+  return size > real(0) ? sum / size : vec3r(0);
+}
+#endif
 
 real fetch_field(IN(Region) r, IN(vec3r) q) {
   if (AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) {

@@ -14,6 +14,7 @@
 //   [ type       | z             | y            | x              ]   inner: address of the node, in blocks of 2^3 texels
 //   [ type       | polar angle   | azimuth      | sample         ]   leaf; the angles only where gradients are needed
 //   [ type       | polar angle   | azimuth      | fill           ]   empty: no cell, or one without value
+//   Polar angle: 0 no gradient, else 1 + 254 * angle from z / pi. Azimuth: 256 * angle from x / (2 pi).
 #define AMRTEX_OCTREE_WIDE 0
 #define AMRTEX_OCTREE_RGBA8 1
 

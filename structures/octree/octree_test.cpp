@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "renderers/raycaster.hpp"
+#include "renderers/scene_bindings.hpp"
+#include "shaders/shader_library.hpp"
 #include "structures/octree/octree_layout.h"
 #include "structures/synthetic.hpp"
 #include "tests/encoding_cases.hpp"
@@ -367,6 +369,75 @@ TEST(Octree, MoreNodesThanATextureHoldsAreRefusedWithTheNumbers) {
   EXPECT_NE(field.find("octree_nodes"), nullptr) << "4 * 4681 bytes fit";
   EXPECT_TRUE(compare(probe_positions(h, 50), reference_values(h, field.definition, probe_positions(h, 50)),
                       probe_on_cpu(h, field, Precision::double_precision, probe_positions(h, 50)), 1e-6));
+}
+
+// ---- gradients
+
+constexpr const char* kGradientProbe = R"(#include "portable_glsl.h"
+#include "contract.glsl"
+layout(local_size_x = 1) in;
+layout(std430) writeonly buffer result_block { vec4 result; };
+uniform ivec3 u_cell;
+void main() {
+  Position p;
+  p.cell = u_cell;
+  p.fraction = vec3(0.3, 0.6, 0.2);
+  Region r;
+  bool inside = locate(p, r);
+  result = vec4(fetch_gradient(r, region_position(r, p)), inside ? 1.0 : 0.0);
+}
+)";
+
+glm::vec4 gradient_at(const AmrHierarchy& h, const EncodedField& field, const Vec3i& cell) {
+  Context& gl = context(ContextKind::egl);
+  ShaderFiles files{{"gradient_probe.comp", kGradientProbe}};
+  for (const ShaderFile& f : shader_files()) files.emplace(f.path, f.text);
+  ShaderKey key;
+  key.entry = "gradient_probe.comp";
+  key.use(field.shader).define("AMRTEX_RAY_DOUBLE", 0);
+  Program program(gl, assemble_shader(key, files));
+  const GlBuffer result = make_buffer(gl);
+  gl.gl().NamedBufferStorage(result.id(), sizeof(glm::vec4), nullptr, 0);
+  const GpuField gpu(field, gl);
+  program.use();
+  for (const UniformValue& u : field_uniforms(h, field)) program.set_optional(u);
+  program.set("u_cell", cell);
+  program.bind_buffer("result_block", result.id());
+  gpu.bind(program);
+  gl.gl().DispatchCompute(1, 1, 1);
+  gl.gl().MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  glm::vec4 value;
+  gl.gl().GetNamedBufferSubData(result.id(), 0, sizeof value, &value);
+  return value;
+}
+
+TEST(Octree, GradientsKeepTheirDirection) {
+  // f = a x + b y + c z has the gradient (a, b, c) in every cell of its interior; steps of pi / 254 and 2 pi / 256 err by half
+  for (const Vec3d& g : {Vec3d(1, 2, 3), Vec3d(-1, 0.2, 0.1), Vec3d(0.3, -2, -1), Vec3d(0, 0, -1)}) {
+    const Function f = [g](const Vec3d& p) { return glm::dot(g, p); };
+    const AmrHierarchy h = MeshBuilder(Vec3i(8), {2}).root(f).patch(1, {Vec3i(0), Vec3i(8)}, f).hierarchy();
+    for (const Filter filter : {Filter::nearest, Filter::linear_lod})
+      for (const char* traversal : {"fast", "paper"}) {
+        BuildRequest request;
+        request.storage = Storage::r8;
+        request.needs.filter = filter;
+        request.needs.gradients = true;
+        request.parameters = {{"layout", "rgba8"}, {"traversal", traversal}};
+        const EncodedField field = find_encoding("octree").build(h, request);
+        for (const Vec3i& cell : {Vec3i(3, 4, 5), Vec3i(12, 11, 10)}) {  // of levels 1 and 0
+          const glm::vec4 got = gradient_at(h, field, cell);
+          EXPECT_EQ(got.w, 1.0F);
+          EXPECT_GT(glm::dot(glm::normalize(g), Vec3d(got)), std::cos(0.015)) << filter_name(filter) << " " << traversal;
+        }
+        // nothing else changes
+        request.needs.gradients = false;
+        const EncodedField without = find_encoding("octree").build(h, request);
+        EXPECT_EQ(without.memory(), field.memory());
+        const auto positions = probe_positions(h, 20);
+        EXPECT_TRUE(compare(positions, values_of(probe_on_cpu(h, without, Precision::single_precision, positions)),
+                            probe_on_cpu(h, field, Precision::single_precision, positions), 0.0));
+      }
+  }
 }
 
 // ---- controls: what is wrong is noticed
