@@ -56,18 +56,27 @@ void add_compensated(INOUT(Accumulation) a, IN(real) amount) {
   a.sum = t;
 }
 
+// One interval of emitted colour (rgb) and optical depth (w).
+void add_light(INOUT(Accumulation) a, IN(vec4r) light) {
+  add_compensated(a, light.w);
+  real transmittance = min(exp(-a.sum), a.transmittance);
+  PRECISE vec3r color = a.color + vec3r(light.x, light.y, light.z) * (a.transmittance - transmittance);
+  a.color = color;
+  a.transmittance = transmittance;
+}
+
+// Colour and optical depth of an interval of one value.
+vec4r interval_light(IN(real) value, IN(real) length) {
+  vec4r light = transfer(value);
+  PRECISE real depth = min(light.w * length, real(1e4));  // exp(-1e4) is 0; infinity would become NaN
+  return vec4r(light.x, light.y, light.z, depth);
+}
+
 // One interval of the exponential midpoint rule: `value` at its middle, `length` in units.
 void accumulate(INOUT(Accumulation) a, IN(real) value, IN(real) length) {
   if (AMRTEX_DRAWS_VOLUME) {
-    vec4r light = transfer(value);
-    if (light.w > real(0)) {
-      PRECISE real depth = min(light.w * length, real(1e4));  // exp(-1e4) is 0; infinity would become NaN
-      add_compensated(a, depth);
-      real transmittance = min(exp(-a.sum), a.transmittance);
-      PRECISE vec3r color = a.color + vec3r(light.x, light.y, light.z) * (a.transmittance - transmittance);
-      a.color = color;
-      a.transmittance = transmittance;
-    }
+    vec4r light = interval_light(value, length);
+    if (light.w > real(0)) add_light(a, light);
   } else if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION) {
     PRECISE real part = value * length;
     add_compensated(a, part);

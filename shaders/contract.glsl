@@ -118,10 +118,53 @@ real trilinear(IN(real) v0, IN(real) v1, IN(real) v2, IN(real) v3, IN(real) v4, 
   return z;
 }
 
+// The eight level values between which f is trilinear about q, in an encoding whose regions are single leaf
+// cells. They stay the same while q stays in one octant of its cell, and across the cell's faces as far as the
+// cells there are leaves of the same level.
+STRUCT Stencil {
+  vec4r lower;  // corners 0 to 3, as texels hold them
+  vec4r upper;  // corners 4 to 7
+  uint leaves;  // bit i: the cell at corner i is a leaf of the region's level and has a value
+};
+
+// Octant of the cell [0, 1)^3 that holds q.
+ivec3 stencil_octant(IN(vec3r) q) { return ivec3(greaterThanEqual(q, vec3r(0.5))); }
+
+// Does the stencil about `octant` of a region give f at q, which may lie in a neighbour of the region?
+bool stencil_holds(IN(Stencil) s, IN(ivec3) octant, IN(vec3r) q) {
+  vec3r from_corner = q - vec3r(octant);
+  bvec3 upper = greaterThanEqual(from_corner, vec3r(0));
+  int corner = (upper.x ? 1 : 0) + (upper.y ? 2 : 0) + (upper.z ? 4 : 0);
+  bool near = all(greaterThanEqual(from_corner, vec3r(-0.5))) && all(lessThan(from_corner, vec3r(0.5)));
+  return near && ((s.leaves >> uint(corner)) & 1u) != 0u;
+}
+
+real stencil_value(IN(Stencil) s, IN(int) field, IN(ivec3) octant, IN(vec3r) q) {
+  PRECISE vec3r from_first = q + vec3r(0.5);
+  PRECISE vec3r f = from_first - vec3r(octant);
+  return decode_value(trilinear(s.lower.x, s.lower.y, s.lower.z, s.lower.w, s.upper.x, s.upper.y, s.upper.z, s.upper.w, f), field);
+}
+
 #include AMRTEX_ENCODING_FILE
 
 // The drawn field: number 0, of which ranges, constants and skipping speak.
 real fetch_field(IN(Region) r, IN(vec3r) q) { return fetch_value(r, 0, q); }
+
+// Optional: every region is one leaf cell. Then fetch_field has one value in it (nearest), or is
+// stencil_value() of what fetch_stencil(r, octant, s) gives (linear), and the march fetches once for many samples.
+#ifndef AMRTEX_CELL_REGIONS
+#define AMRTEX_CELL_REGIONS false
+void fetch_stencil(IN(Region) r, IN(ivec3) octant, OUT(Stencil) s) {
+  s.lower = vec4r(0);
+  s.upper = vec4r(0);
+  s.leaves = 0u;
+}
+#endif
+
+// Optional: `vec3r fetch_gradient(Region r, vec3r q)`, the stored gradient of f per cell width of r along each axis.
+#ifndef AMRTEX_FETCH_GRADIENT
+#define AMRTEX_FETCH_GRADIENT 0
+#endif
 
 bool region_contains(IN(Region) r, IN(ivec3) cell) {
   return all(greaterThanEqual(cell, r.lower)) && all(lessThan(cell, r.upper));

@@ -54,6 +54,47 @@ void take_sample(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q, IN(real) leng
   accumulate(a, value, length);
 }
 
+// Many intervals of one length in a region of one value: what take_sample does with each, in
+// the same order, so that the bits are the same; but one fetch and one transfer for all.
+// `begin` and `way`: where the first interval begins, and from each to the next.
+void take_constant_samples(INOUT(Accumulation) a, IN(Region) r, IN(real) count, IN(real) length, IN(ray_real) begin, IN(ray_real) way) {
+  real value = fetch_field(r, vec3r(0.5));
+  if (AMRTEX_COUNT != 0) a.counted.x += int(count);
+  bool missing = AMRTEX_VALIDITY != 0 && is_no_value(value);
+#if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
+  if (AMRTEX_ISOVALUES != 0) {
+    note_side(a, missing, value, begin, begin + way * ray_real(0.5));
+    if (a.crossing) return;
+    a.before = begin + way * ray_real(count - real(0.5));
+  }
+#endif
+  if (missing) return;
+  vec4r light = vec4r(1);
+  if (AMRTEX_DRAWS_VOLUME) light = interval_light(value, length);
+  if (AMRTEX_MODE == AMRTEX_MODE_ISO) light.w = real(0);
+  real i = real(0);
+  if (light.w > real(0)) {
+    do {
+      if (AMRTEX_DRAWS_VOLUME) add_light(a, light);
+      else accumulate(a, value, length);
+      i += real(1);
+    } while (i < count && AMRTEX_MODE != AMRTEX_MODE_MIP && !ray_ended(a));
+  }
+}
+
+void take_stencil_sample(INOUT(Accumulation) a, IN(Stencil) s, IN(ivec3) octant, IN(vec3r) q, IN(real) length, IN(ray_real) begin,
+                         IN(ray_real) at) {
+  if (AMRTEX_COUNT != 0) a.counted.x += 1;
+  real value = stencil_value(s, 0, octant, q);
+#if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
+  if (AMRTEX_ISOVALUES != 0) {
+    note_side(a, false, value, begin, at);
+    if (a.crossing) return;
+  }
+#endif
+  accumulate(a, value, length);
+}
+
 // A region that is not sampled, up to `exit`: a ray passes on its side, and loses it where there is no mesh.
 void pass_region(INOUT(Accumulation) a, IN(bool) inside, IN(Region) r, IN(ray_real) exit) {
 #if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
@@ -117,14 +158,29 @@ ivec3 lattice_cell(IN(LatticeBlock) block, IN(real) i) {
 
 // First sample after i of the block that lies outside the region, at most `count`.
 int lattice_exit(IN(LatticeBlock) block, IN(vec3r) inverse_step, IN(Region) r, IN(int) i, IN(int) count) {
-  vec3r to_lower = (vec3r(r.lower - block.cell) * AMRTEX_QUANTA - block.fraction) * inverse_step;
-  vec3r to_upper = (vec3r(r.upper - block.cell) * AMRTEX_QUANTA - block.fraction) * inverse_step;
-  vec3r far = max(to_lower, to_upper);
+  bvec3 up = greaterThanEqual(block.step, vec3r(0));
+  ivec3 face = ivec3(up.x ? r.upper.x : r.lower.x, up.y ? r.upper.y : r.lower.y, up.z ? r.upper.z : r.lower.z);
+  vec3r plane = vec3r(face - block.cell) * AMRTEX_QUANTA;
+  vec3r far = (plane - block.fraction) * inverse_step;
   real exit = min(min(far.x, far.y), min(far.z, real(count)));
   int next = clamp(int(ceil(exit - real(0.5))), i + 1, count);
-  // the division rounds; the samples' own cells decide
-  bool too_far = next > i + 1 && !region_contains(r, lattice_cell(block, real(next - 1)));
-  bool too_near = next < count && region_contains(r, lattice_cell(block, real(next)));
+  // the division rounds; where the samples lie decides
+  bool too_far = false;
+  bool too_near = false;
+#if AMRTEX_CPP || !AMRTEX_RAY_DOUBLE
+  if (AMRTEX_RAY_DOUBLE == 0) {
+    // Offsets and planes are whole numbers of quanta below 2^24. Inside is below the upper plane, or not below
+    // the lower one; beyond the domain's faces samples belong to the last cell.
+    vec3r sense = vec3r(up) * real(2) - vec3r(1);
+    ivec3 open = ivec3(equal(face, ivec3(up) * u_domain_cells));
+    vec3r bound = sense * plane + (vec3r(1) - vec3r(up)) + vec3r(open) * real(1e30);
+    too_far = next > i + 1 && any(greaterThanEqual(sense * lattice_offset(block, real(next - 1)), bound));
+    too_near = next < count && all(lessThan(sense * lattice_offset(block, real(next)), bound));
+    return next + (too_near ? 1 : 0) - (too_far ? 1 : 0);
+  }
+#endif
+  too_far = next > i + 1 && !region_contains(r, lattice_cell(block, real(next - 1)));
+  too_near = next < count && region_contains(r, lattice_cell(block, real(next)));
   return next + (too_near ? 1 : 0) - (too_far ? 1 : 0);
 }
 
@@ -172,6 +228,10 @@ ray_real lattice_place(IN(LatticeBlock) block, IN(real) i) { return ray_real(u_s
 
 // Returns the sample that lies across a surface, or `next`.
 int march_lattice_region(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(Region) r, IN(int) first, IN(int) next) {
+  if (AMRTEX_CELL_REGIONS && AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) {
+    take_constant_samples(a, r, real(next - first), u_step, lattice_place(block, real(first)), ray_real(u_step));
+    return AMRTEX_ISOVALUES != 0 && a.crossing ? first : next;
+  }
   LatticeFrame frame = lattice_frame(block, r);
   real i = real(first);
   real end = real(next);
@@ -190,8 +250,37 @@ vec3r safe_inverse(IN(vec3r) v) {
   return real(1) / (v + tiny);
 }
 
+// Samples from `first` on for which the eight values about it hold; returns the first that needs others, or
+// lies across a surface.
+int march_lattice_stencil(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(Region) r, IN(int) first, IN(int) count) {
+  LatticeFrame frame = lattice_frame(block, r);
+  real i = real(first);
+  real end = real(count);
+  vec3r q = lattice_q(block, frame, r, i);
+  ivec3 octant = stencil_octant(q);
+  Stencil s;
+  fetch_stencil(r, octant, s);
+  bool holds = true;
+  do {
+    take_stencil_sample(a, s, octant, q, u_step, lattice_place(block, i), lattice_place(block, i + real(0.5)));
+    i += real(1);
+    q = lattice_q(block, frame, r, i);
+    holds = stencil_holds(s, octant, q);
+  } while (holds && i < end && !ray_stopped(a));
+  return AMRTEX_ISOVALUES != 0 && a.crossing ? int(i) - 1 : int(i);
+}
+
+Position lattice_position(IN(LatticeBlock) block, IN(real) i) {
+  Position p;
+  vec3r offset = lattice_offset(block, i) * AMRTEX_QUANTUM;
+  p.cell = clamp(block.cell + ivec3(floor(offset)), ivec3(0), u_domain_cells - ivec3(1));
+  p.fraction = offset - floor(offset);
+  return p;
+}
+
 // From sample `from` of the block; returns the one across a surface, or `count`.
 int march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) from, IN(int) count) {
+  bool stencils = AMRTEX_CELL_REGIONS && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST;  // their own cells decide where they end
   vec3r inverse_step = safe_inverse(block.step);
   int i = from;
   if (i < count) {
@@ -201,17 +290,14 @@ int march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) f
       bool skipped = true;
       do {  // the next region that can be seen: all lanes of a SIMD group then sample together
         first = i;
-        Position p;
-        vec3r offset = lattice_offset(block, real(i)) * AMRTEX_QUANTUM;
-        p.cell = clamp(block.cell + ivec3(floor(offset)), ivec3(0), u_domain_cells - ivec3(1));
-        p.fraction = offset - floor(offset);
-        bool inside = locate(p, r);
-        i = lattice_exit(block, inverse_step, r, i, count);
+        bool inside = locate(lattice_position(block, real(i)), r);
         skipped = !inside || region_invisible(a, r);
+        if (skipped || !stencils) i = lattice_exit(block, inverse_step, r, i, count);
         count_region(a, skipped);
         if (skipped) pass_region(a, inside, r, lattice_place(block, real(i) - real(0.5)));
       } while (skipped && i < count);
-      if (!skipped) i = march_lattice_region(a, block, r, first, i);
+      if (stencils && !skipped) i = march_lattice_stencil(a, block, r, first, count);
+      if (!stencils && !skipped) i = march_lattice_region(a, block, r, first, i);
     } while (i < count && !ray_stopped(a));
   }
   return i;
@@ -268,14 +354,42 @@ Position leave_region(IN(Ray) ray, IN(Region) r, IN(ray_real) t, IN(bvec3) throu
   return p;
 }
 
+// What march_adaptive_region does, with the eight values of one octant at a time.
+real march_adaptive_cell(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(vec3r) dq, IN(real) count, IN(real) interval,
+                         IN(ray_real) begin, IN(real) from) {
+  real i = from;
+  vec3r q = q0 + dq * i;
+  if (i < count) {
+    do {
+      ivec3 octant = stencil_octant(q);
+      Stencil s;
+      fetch_stencil(r, octant, s);
+      bool same = true;
+      do {
+        take_stencil_sample(a, s, octant, q, interval, begin + ray_real(interval * (i - real(0.5))), begin + ray_real(interval * i));
+        i += real(1);
+        q = q0 + dq * i;
+        same = all(equal(stencil_octant(q), octant));
+      } while (same && i < count && !ray_stopped(a));
+    } while (i < count && !ray_stopped(a));
+  }
+  return i - real(1);
+}
+
 // From interval middle `from` on; returns that across a surface, or of the last sample.
 real march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(vec3r) direction, IN(real) length, IN(ray_real) begin,
                            IN(real) from) {
   real inverse_width = real(1) / real(r.width);
   real count = max(ceil(length * inverse_width / u_step - real(1e-4)), real(1));
   real interval = length / count;
+  if (AMRTEX_CELL_REGIONS && AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) {
+    ray_real first = begin + ray_real(interval * (from - real(0.5)));
+    take_constant_samples(a, r, count - (from - real(0.5)), interval, first, ray_real(interval));
+    return from;
+  }
   vec3r q0 = f * inverse_width;
   vec3r dq = direction * (interval * inverse_width);
+  if (AMRTEX_CELL_REGIONS) return march_adaptive_cell(a, r, q0, dq, count, interval, begin, from);
   real i = from;
   if (i < count) {
     do {

@@ -31,11 +31,8 @@ struct EncodingCase {
   Json parameters;
 
   std::string name() const { return fmt::format("{} {} {}", encoding->name(), filter_name(filter), parameters.dump()); }
-  /// Filterings that make a difference.
-  std::vector<Filtering> filterings() const {
-    if (filter == Filter::nearest) return {Filtering::manual};
-    return {Filtering::manual, Filtering::hardware};
-  }
+  /// Filterings that make a difference and that the encoding has.
+  std::vector<Filtering> filterings() const;
 };
 
 struct BuildOptions {
@@ -59,14 +56,25 @@ inline EncodedField build(const AmrHierarchy& h, const EncodingCase& c, const Bu
   return c.encoding->build(h, request);
 }
 
-inline bool accepted(const EncodingCase& c) {
-  static const AmrHierarchy mesh = nested(waves).hierarchy();
+/// Does the encoding take this mesh? What it refuses is a record `unsupported` and no failure.
+inline bool accepted(const AmrHierarchy& h, const EncodingCase& c, const BuildOptions& options = {}) {
   try {
-    build(mesh, c);
+    build(h, c, options);
     return true;
   } catch (const UnsupportedError&) {
     return false;
   }
+}
+
+inline bool accepted(const EncodingCase& c, const BuildOptions& options = {}) {
+  static const AmrHierarchy mesh = nested(waves).hierarchy();
+  return accepted(mesh, c, options);
+}
+
+inline std::vector<Filtering> EncodingCase::filterings() const {
+  std::vector<Filtering> all{Filtering::manual};
+  if (filter != Filter::nearest && accepted(*this, {.filtering = Filtering::hardware})) all.push_back(Filtering::hardware);
+  return all;
 }
 
 /// The values that a parameter's description spells out: its numbers and its quoted names.
