@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include "bench/commands.hpp"
+#include "bench/paper_tables.hpp"
 #include "bench/record.hpp"
 #include "bench/report.hpp"
 #include "bench/runner.hpp"
@@ -49,8 +50,29 @@ void write_tables(const fs::path& folder, const std::vector<Table>& tables) {
   write_text(folder / "table.tex", latex);
 }
 
+/// Writes the ordinary tables, then those beside a paper; so the first are there when tables.json ends in an error.
+std::vector<Table> write_report(const fs::path& folder, const std::string& columns) {
+  std::vector<Table> tables = tables_of(folder, columns);
+  write_tables(folder, tables);
+  const fs::path file = folder / "tables.json";
+  if (!fs::exists(file)) return tables;
+  for (Table& table : make_paper_tables(file, load_records(folder))) tables.push_back(std::move(table));
+  write_tables(folder, tables);
+  return tables;
+}
+
+/// The experiment's own choice of tables goes along with its records.
+void copy_beside(const Experiment& experiment, const fs::path& folder, const char* name) {
+  const fs::path source = experiment.file.parent_path() / name, target = folder / name;
+  std::error_code absent;
+  if (fs::exists(source) && !fs::equivalent(source, target, absent))
+    fs::copy_file(source, target, fs::copy_options::overwrite_existing);
+}
+
 int run(const Arguments& a) {
   const Experiment experiment = read_experiment(a.input);
+  const fs::path paper_tables = experiment.file.parent_path() / "tables.json";
+  if (fs::exists(paper_tables)) make_paper_tables(paper_tables, {});  // an error ends here, before any work
   RunOptions options;
   options.folder = a.output;
   options.force = a.force;
@@ -58,11 +80,8 @@ int run(const Arguments& a) {
   if (!a.memory_limit.empty()) options.memory_limit = parse_bytes(a.memory_limit);
   if (isatty(STDERR_FILENO) != 0) options.progress = [](const std::string& text) { fmt::print(stderr, "{}\n", text); };
   const RunSummary s = run_experiment(experiment, options);
-  // the experiment's own choice of columns goes along with its records
-  const fs::path columns = experiment.file.parent_path() / "columns.json";
-  if (fs::exists(columns)) fs::copy_file(columns, fs::path(a.output) / "columns.json", fs::copy_options::overwrite_existing);
-  const std::vector<Table> tables = tables_of(a.output, "");
-  write_tables(a.output, tables);
+  for (const char* name : {"columns.json", "tables.json"}) copy_beside(experiment, a.output, name);
+  const std::vector<Table> tables = write_report(a.output, "");
   if (a.json) {
     const Json json{{"measured", s.measured},
                     {"kept", s.kept},
@@ -80,8 +99,7 @@ int run(const Arguments& a) {
 }
 
 int report(const Arguments& a) {
-  const std::vector<Table> tables = tables_of(a.input, a.columns);
-  write_tables(a.input, tables);
+  const std::vector<Table> tables = write_report(a.input, a.columns);
   for (const Table& t : tables) fmt::print("{}\n", to_markdown(t));
   fmt::print("{0}/table.md, {0}/table.csv, {0}/table.tex\n", a.input);
   return 0;

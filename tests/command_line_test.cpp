@@ -516,6 +516,31 @@ TEST_F(CommandLine, ReportMakesTheTablesFromRecordsAlone) {
                    AllOf(HasSubstr("totl"), HasSubstr("total")));
 }
 
+TEST_F(CommandLine, TablesBesideAPaperFollowTheOrdinaryOnes) {
+  const Json row{{"label", "memory"}, {"value", "/memory/total_bytes"}, {"paper", 123}};
+  const Json table{{"title", "Table 7"}, {"datasets", "plt00008"}, {"where", {{"/encoding", "uniform"}}}, {"rows", {row}}};
+  write_text(at("tables.json"), with(table, "titel", "").dump(1));
+  expect_complaint(run(small_experiment()), 2, AllOf(HasSubstr("tables.json:"), HasSubstr("did you mean 'title'?")));
+  EXPECT_FALSE(fs::exists(at("out"))) << "before any work";
+
+  write_text(at("tables.json"), table.dump());
+  EXPECT_EQ(counts_of_run(small_experiment()).at("measured"), 3);
+  const std::string text = read_text(at("out") / "table.md");
+  EXPECT_LT(text.find("### small"), text.find("### Table 7"));
+  EXPECT_THAT(text, HasSubstr("| quantity | plt00008, ours | plt00008, paper |\n| --- | ---: | ---: |\n| memory | "));
+  for (const char* name : {"table.md", "table.csv", "table.tex"}) fs::remove_all(at("out") / name);
+  EXPECT_EQ(amrtex({"report", at("out")}).exit_code, 0);
+  EXPECT_EQ(read_text(at("out") / "table.md"), text);
+  EXPECT_THAT(read_text(at("out") / "table.tex"), HasSubstr("\\caption{Table 7."));
+  EXPECT_THAT(read_text(at("out") / "table.csv"), HasSubstr("renderer,row,plt00008_ours,plt00008_paper"));
+
+  write_text(at("out") / "tables.json", with(table, "where", Json::object()).dump());
+  fs::remove(at("out") / "table.md");
+  expect_complaint(amrtex({"report", at("out")}), 2,
+                   AllOf(HasSubstr("row 'memory'"), HasSubstr("3 records"), HasSubstr("/encoding")));
+  EXPECT_THAT(read_text(at("out") / "table.md"), HasSubstr("### small")) << "the ordinary tables need no tables.json";
+}
+
 TEST_F(CommandLine, ReportNamesABrokenRecord) {
   EXPECT_EQ(counts_of_run(one_point()).at("measured"), 1);
   write_text(some_record(), "{");

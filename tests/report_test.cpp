@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "bench/paper_tables.hpp"
 #include "bench/record.hpp"
 #include "structures/error.hpp"
 
@@ -236,6 +237,174 @@ TEST(ReadColumns, NamesFileAndKnownKeys) {
                                          HasSubstr("texels_per_cell")));
   }
   std::filesystem::remove(path);
+}
+
+// --- tables beside a paper ---
+
+/// Writes a tables.json and makes its tables.
+class PaperTables : public testing::Test {
+ protected:
+  ~PaperTables() override { std::filesystem::remove(path_); }
+
+  std::vector<Table> tables(const std::string& text, const std::vector<Json>& records) const {
+    std::ofstream(path_) << text;
+    return make_paper_tables(path_, records);
+  }
+  /// The rows of one table as text, of the data set of `record`.
+  std::vector<std::vector<std::string>> rows(const std::string& rows, const std::vector<Json>& records) {
+    const auto all = tables(R"({"title": "Table 2", "datasets": "blobs_&_shell", "rows": )" + rows + "}", records);
+    EXPECT_EQ(all.size(), 1u);
+    notes_ = all.at(0).notes;
+    std::vector<std::vector<std::string>> list;
+    for (const auto& row : all.at(0).rows) {
+      list.emplace_back();
+      for (const Cell& cell : row) list.back().push_back(format_cell(cell));
+    }
+    return list;
+  }
+  std::string complaint(const std::string& text, const std::vector<Json>& records = {}) const {
+    try {
+      tables(text, records);
+    } catch (const UsageError& e) {
+      const std::string what = e.what();
+      return what.starts_with(path_.string()) ? what.substr(path_.string().size()) : "without the file: " + what;
+    }
+    return "accepted";
+  }
+
+  const std::filesystem::path path_ =
+      std::filesystem::temp_directory_path() / ("amrtex_tables_" + std::to_string(::getpid()) + ".json");
+  std::vector<std::string> notes_;
+};
+
+TEST_F(PaperTables, SetTheirNumbersBesideOurs) {
+  const std::vector<Json> records = {record("uniform", 4), page_table(8, 2)};
+  EXPECT_THAT(rows(R"j([{"label": "payload (MB)", "where": {"/encoding": "uniform"}, "value": "/memory/by_role/payload",
+                        "scale": 1e-6, "paper": 10.89
+},
+                       {"label": "frames/s", "where": {"/encoding": "uniform"}, "value": "/frame/wall_ms/median",
+                        "inverse": true, "scale": 1000, "paper": [120]},
+                       {"label": "borders and tables", "where": {"/encoding": "page_table"},
+                        "value": ["/memory/by_role/duplicated", "/memory/by_role/topology"], "paper": ["> 1 GB"]},
+                       {"label": "frame (ms)", "where": {"/encoding": "uniform"}, "value": "/frame/wall_ms"}])j",
+                   records),
+              ElementsAre(ElementsAre("payload (MB)", "1.049", "10.89"), ElementsAre("frames/s", "250", "120"),
+                          ElementsAre("borders and tables", "1048576", "> 1 GB"), ElementsAre("frame (ms)", "4 ± 0.5", "–")));
+  EXPECT_THAT(notes_, ElementsAre());
+}
+
+TEST_F(PaperTables, DivideOneRecordByAnother) {
+  const auto ratio = [&](const std::string& rest) {
+    return rows(R"([{"label": "a", "where": {"/encoding": "page_table"}, "value": "/frame/wall_ms/median", )" + rest + "}]",
+                {record("uniform", 4), page_table(8, 2)})[0][1];
+  };
+  EXPECT_EQ(ratio(R"("inverse": true, "over": {"where": {"/encoding": "uniform"}})"), "2");
+  EXPECT_EQ(ratio(R"("scale": 100, "over": {"where": {"/encoding": "uniform"}})"), "50");
+  EXPECT_EQ(ratio(R"("over": {"where": {"/encoding": "page_table"}, "value": "/work/rays"})"), "9.77e-04");
+  EXPECT_EQ(ratio(R"("over": {"where": {"/encoding": "uniform"}, "value": "/build_parameters/page_size"})"), "–");
+  EXPECT_THAT(notes_, ElementsAre("over: no value at /build_parameters/page_size: a of blobs_&_shell"));
+  EXPECT_EQ(ratio(R"("over": {"where": {"/encoding": "uniform"}, "value": "/error/rmse"})"), "–") << "a division by 0";
+}
+
+TEST_F(PaperTables, SpeedsSpreadAsTheirTimesDo) {
+  const auto table =
+      rows(R"([{"label": "frames/s", "value": "/frame/wall_ms", "inverse": true, "scale": 1000}])", {record("uniform", 10)});
+  EXPECT_EQ(table[0][1], "100 ± 5");
+}
+
+TEST_F(PaperTables, ConditionsAreValuesOrListsOfThem) {
+  Json iso = record("uniform", 1);
+  iso["render"]["isovalues"] = {0.5, 1};
+  const auto found = [&](const std::string& where) {
+    return rows(R"([{"label": "a", "value": "/frame/wall_ms/median", "where": )" + where + "}]", {iso, page_table(8, 2)})[0][1];
+  };
+  EXPECT_EQ(found(R"({"/encoding": ["page_table", "octree"], "/build_parameters": {"centring": "cell", "page_size": 8.0}})"),
+            "2");
+  EXPECT_EQ(found(R"({"/render/isovalues": [0.5, 1.0]})"), "1");
+  EXPECT_EQ(found(R"({"/render/isovalues": [[0.5], [0.5, 1]]})"), "1");
+  EXPECT_EQ(found(R"({"/render/isovalues": null})"), "2");
+  EXPECT_EQ(found(R"({"/render/isovalues": 0.5})"), "–");
+}
+
+TEST_F(PaperTables, DataSetsAreColumnsAndThePaperMayHaveFewer) {
+  Json other = record("uniform", 3);
+  other["dataset"]["name"] = "own";
+  const std::string text = R"([{"title": "T", "notes": ["their GPU"], "datasets": ["own", "blobs_&_shell", "absent"],
+      "where": {"/encoding": "uniform"},
+      "rows": [{"label": "ms", "value": "/frame/wall_ms/median", "paper": [1.5]},
+               {"label": "of own", "where": {"/dataset/name": "own"}, "value": "/frame/wall_ms/median"},
+               {"label": "pages", "where": {"/encoding": "page_table"}, "value": "/statistics/pages", "paper": [null, null, null]}]}])";
+  const Table table = tables(text, {other, record("uniform", 2), page_table(8, 9)}).at(0);
+  EXPECT_THAT(keys(table), ElementsAre("row", "own_ours", "own_paper", "blobs_&_shell_ours", "absent_ours"));
+  EXPECT_THAT(cells(table, "own_ours"), ElementsAre("3", "3", "–"));
+  EXPECT_THAT(cells(table, "own_paper"), ElementsAre("1.5", "–", "–"));
+  EXPECT_THAT(cells(table, "blobs_&_shell_ours"), ElementsAre("2", "3", "–"));
+  EXPECT_THAT(cells(table, "absent_ours"), ElementsAre("–", "3", "–"));
+  EXPECT_THAT(table.notes, ElementsAre("their GPU", "no record: pages of own; ms of absent; pages of absent",
+                                       "no value at /statistics/pages: pages of blobs_&_shell"));
+  EXPECT_THAT(to_latex(table), HasSubstr("quantity & own, ours & own, paper & blobs\\_\\&\\_shell, ours & absent, ours"));
+}
+
+TEST_F(PaperTables, ShowTheStatusOfWhatWasNotMeasured) {
+  const Json over = not_measured(page_table(4, 1), Status::over_budget, "too big");
+  const Json failed = not_measured(page_table(8, 1), Status::failed, "picture");
+  const std::string row = R"([{"label": "a", "value": "/frame/wall_ms/median", "where": {"/encoding": "page_table"}}])";
+  EXPECT_EQ(rows(row, {over, failed})[0][1], "failed, over_budget");
+  EXPECT_EQ(rows(row, {over, page_table(16, 3)})[0][1], "3");
+  EXPECT_THAT(notes_, ElementsAre("other records are over_budget: a of blobs_&_shell"));
+  EXPECT_EQ(rows(R"([{"label": "a", "value": "/frame/wall_ms/median", "where": {"/encoding": "uniform"},
+                      "over": {"where": {"/encoding": "page_table"}}}])",
+                 {record("uniform", 2), failed})[0][1],
+            "over: failed");
+}
+
+TEST_F(PaperTables, ARowOfSeveralValuesIsAnError) {
+  const std::string text = R"([{"title": "T", "datasets": "blobs_&_shell", "rows": [
+    {"label": "memory", "value": "/memory/total_bytes"},
+    {"label": "time", "value": "/frame/wall_ms/median"}]}])";
+  Json again = page_table(8, 3);
+  again["render"]["view"] = {{"eye", {1, 2, 3}}};
+  again["render"]["view_name"] = "view 2";
+  EXPECT_EQ(complaint(text, {page_table(8, 3), again}), "accepted");
+  EXPECT_EQ(complaint(text, {page_table(8, 2), again, page_table(16, 3)}),
+            ":3: [0].rows[1]: row 'time', data set 'blobs_&_shell': 3 records with different values match; they differ in: "
+            "/build_parameters/page_size, /render/view_name");
+}
+
+TEST_F(PaperTables, NeverMixRenderers) {
+  std::vector<Json> records = {record("uniform", 2), record("uniform", 3)};
+  records[0]["context"]["renderer"] = "Some GPU";
+  const auto all = tables(
+      R"({"title": "T", "datasets": "blobs_&_shell", "rows": {"label": "ms", "value": "/frame/wall_ms/median"}})", records);
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_THAT(all[0].constants, ElementsAre(std::pair<std::string, std::string>("renderer", "Some GPU")));
+  EXPECT_THAT(cells(all[0], "blobs_&_shell_ours"), ElementsAre("2"));
+  EXPECT_THAT(cells(all[1], "blobs_&_shell_ours"), ElementsAre("3"));
+}
+
+TEST_F(PaperTables, ErrorsNameLineKeyAndWhatIsAccepted) {
+  const auto of_row = [&](const std::string& row) {
+    return complaint("[{\"title\": \"T\", \"datasets\": [\"a\", \"b\"], \"rows\":\n[" + row + "]}]");
+  };
+  EXPECT_EQ(of_row(R"({"label": "x", "value": "/memory/total_bytes", "paper": [1, null]})"), "accepted");
+  EXPECT_THAT(of_row(R"({"label": "x", "vaule": "/frame"})"),
+              HasSubstr(":2: [0].rows[0].vaule: unknown key; accepted: label, where"));
+  EXPECT_THAT(of_row(R"({"label": "x"})"), HasSubstr("the key 'value' is missing"));
+  EXPECT_THAT(of_row(R"({"label": "x", "value": "/memmory/total_bytes"})"),
+              testing::AllOf(HasSubstr("'/memmory/total_bytes' is no place in a record"), HasSubstr("did you mean '/memory'?")));
+  EXPECT_THAT(of_row(R"({"label": "x", "value": "memory"})"), HasSubstr("accepted: a JSON pointer"));
+  EXPECT_THAT(of_row(R"({"label": "x", "value": "/memory/~"})"), HasSubstr("accepted: a JSON pointer"));
+  EXPECT_THAT(of_row(R"({"label": "x", "value": "/frame", "where": {"/mode": "dvr"}})"),
+              HasSubstr(".where./mode: '/mode' is no"));
+  EXPECT_THAT(of_row(R"({"label": "x", "value": "/frame", "where": {"/encoding": []}})"), HasSubstr("an empty list"));
+  EXPECT_THAT(of_row(R"({"label": "x", "value": "/frame", "scale": 0})"), HasSubstr("rows[0].scale: a number above 0"));
+  EXPECT_THAT(of_row(R"({"label": "x", "value": "/frame", "over": {"scale": 2}})"), HasSubstr("accepted: where, value, inverse"));
+  EXPECT_THAT(of_row(R"({"label": "x", "value": "/frame", "paper": [1, 2, 3]})"), HasSubstr("3 values for 2 data sets"));
+  EXPECT_THAT(of_row(R"({"label": "x", "value": "/frame", "paper": [true]})"), HasSubstr("paper[0]: a number, a text or null"));
+  EXPECT_THAT(complaint(R"({"title": "T", "datasets": ["a", "a"], "rows": []})"), HasSubstr("'a' is given twice"));
+  EXPECT_THAT(complaint(R"({"title": "T", "datasets": "blobs_&_shell", "rows": {"label": "x", "value": "/render/mode"}})",
+                        {record("uniform", 1)}),
+              HasSubstr("/render/mode is no number in a record; accepted: a number, or a timing"));
 }
 
 }  // namespace
