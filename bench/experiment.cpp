@@ -119,9 +119,10 @@ class Parser {
   }
 
   /// All combinations of the axes among the members; the last one varies fastest.
-  std::vector<Choice> combinations(const JsonNode& object) {
+  std::vector<Choice> combinations(const JsonNode& object, std::span<const std::string_view> except = {}) {
     std::vector<Choice> all = {{}};
     for (const auto& [key, node] : object.members()) {
+      if (std::find(except.begin(), except.end(), key) != except.end()) continue;
       std::vector<Choice> next;
       const std::vector<JsonNode> items = values(key, node);
       for (const Choice& choice : all)
@@ -215,45 +216,61 @@ class Parser {
 
   // --- builds ---
 
+  /// What encodings are built for: each list of the file, or an encoding's own.
+  struct BuildAxes {
+    std::vector<Filter> filters;
+    std::vector<Storage> storages;
+    std::vector<Filtering> filterings;
+  };
+  static constexpr std::array<std::string_view, 3> kBuildAxes = {"filters", "storage", "filtering"};
+
+  BuildAxes build_axes(const JsonNode& node, const BuildAxes& otherwise) {
+    return {parsed_values<Filter>(node, "filters", otherwise.filters, parse_filter),
+            parsed_values<Storage>(node, "storage", otherwise.storages, parse_storage),
+            parsed_values<Filtering>(node, "filtering", otherwise.filterings, parse_filtering)};
+  }
+
+  template <class T>
+  std::vector<T> parsed_values(const JsonNode& object, std::string_view key, const std::vector<T>& otherwise,
+                               T (*from_name)(std::string_view)) {
+    const auto node = object.find(key);
+    if (!node) return otherwise;
+    std::vector<T> parsed;
+    for (const JsonNode& item : values(key, *node)) parsed.push_back(located(item, [&] { return from_name(item.text()); }));
+    return parsed;
+  }
+
   void parse_builds() {
     root_.require("encodings");
-    const auto filters = parsed_values<Filter>("filters", Filter::nearest, parse_filter);
-    const auto storages = parsed_values<Storage>("storage", Storage::r32f, parse_storage);
-    const auto filterings = parsed_values<Filtering>("filtering", Filtering::hardware, parse_filtering);
-    const std::vector<BuildPoint> encodings = parse_encodings();
+    const BuildAxes axes = build_axes(root_, {{Filter::nearest}, {Storage::r32f}, {Filtering::hardware}});
+    std::vector<BuildPoint> builds;
+    for (const JsonNode& node : values("encodings")) parse_encoding_axes(node, axes, builds);
     for (std::size_t dataset = 0; dataset < experiment_.datasets.size(); ++dataset)
-      for (BuildPoint build : encodings)
-        for (const Filter filter : filters)
-          for (const Storage storage : storages)
-            for (const Filtering filtering : filterings) {
-              build.dataset = dataset;
-              build.filter = filter;
-              build.storage = storage;
-              build.filtering = filter == Filter::nearest ? Filtering::manual : filtering;
-              experiment_.builds.push_back(build);
-            }
+      for (BuildPoint build : builds) {
+        build.dataset = dataset;
+        experiment_.builds.push_back(build);
+      }
     remove_repeated<BuildPoint>(experiment_.builds, [](const BuildPoint& b) {
       return fmt::format("{} {} {} {} {} {}", b.dataset, b.encoding, b.parameters.dump(), filter_name(b.filter),
                          format_name(b.storage), filtering_name(b.filtering));
     });
   }
 
-  template <class T>
-  std::vector<T> parsed_values(std::string_view key, T otherwise, T (*from_name)(std::string_view)) {
-    std::vector<T> parsed;
-    for (const JsonNode& node : values(key)) parsed.push_back(located(node, [&] { return from_name(node.text()); }));
-    if (parsed.empty()) parsed.push_back(otherwise);
-    return parsed;
-  }
-
-  std::vector<BuildPoint> parse_encodings() {
-    std::vector<BuildPoint> builds;
-    for (const JsonNode& node : values("encodings")) {
-      node.members();
-      node.require("name");
-      for (const Choice& choice : combinations(node)) builds.push_back(parse_encoding(node, choice));
+  void parse_encoding_axes(const JsonNode& node, const BuildAxes& general, std::vector<BuildPoint>& builds) {
+    node.members();
+    node.require("name");
+    const BuildAxes axes = build_axes(node, general);
+    for (const Choice& choice : combinations(node, kBuildAxes)) {
+      BuildPoint build = parse_encoding(node, choice);
+      for (const Filter filter : axes.filters)
+        for (const Storage storage : axes.storages)
+          for (const Filtering filtering : axes.filterings) {
+            build.filter = filter;
+            build.storage = storage;
+            build.filtering = filter == Filter::nearest ? Filtering::manual : filtering;
+            builds.push_back(build);
+          }
     }
-    return builds;
   }
 
   static BuildPoint parse_encoding(const JsonNode& node, const Choice& choice) {
@@ -272,6 +289,7 @@ class Parser {
   static void accept_parameters(const Encoding& encoding, const Choice& choice) {
     const std::vector<ParameterInfo> parameters = encoding.parameters();
     Names known = {"name"};
+    known.insert(known.end(), kBuildAxes.begin(), kBuildAxes.end());
     for (const ParameterInfo& p : parameters) known.push_back(p.name);
     for (const auto& [key, node] : choice)
       if (std::find(known.begin(), known.end(), key) == known.end())

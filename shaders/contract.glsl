@@ -161,9 +161,11 @@ void fetch_stencil(IN(Region) r, IN(ivec3) octant, OUT(Stencil) s) {
 }
 #endif
 
-// Optional: `vec3r fetch_gradient(Region r, vec3r q)`, the stored gradient of f per cell width of r along each axis.
+// Optional: `vec3r fetch_gradient(Region r, vec3r q)`, the stored gradient of f per cell width of r along each axis,
+// and AMRTEX_STORED_GRADIENTS: were any stored?
 #ifndef AMRTEX_FETCH_GRADIENT
 #define AMRTEX_FETCH_GRADIENT 0
+#define AMRTEX_STORED_GRADIENTS false
 #endif
 
 bool region_contains(IN(Region) r, IN(ivec3) cell) {

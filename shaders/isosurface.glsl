@@ -131,9 +131,24 @@ vec3r surface_gradient(IN(Position) p, IN(real) value) {
   return gradient;
 }
 
+#if AMRTEX_FETCH_GRADIENT
+// The gradient that the encoding stores.
+vec3r stored_gradient(IN(Position) p) {
+  Region r;
+  if (!locate(p, r)) return vec3r(0);
+  return fetch_gradient(r, region_position(r, p)) * vec3r(u_cells_per_unit) / real(r.width);
+}
+#endif
+
 // Unit normal, along the gradient; 0 where there is no gradient.
 vec3r surface_normal(IN(Position) p, IN(real) value) {
-  vec3r gradient = surface_gradient(p, value);
+  vec3r gradient = vec3r(0);
+#if AMRTEX_FETCH_GRADIENT
+  if (AMRTEX_STORED_GRADIENTS) gradient = stored_gradient(p);
+  else gradient = surface_gradient(p, value);
+#else
+  gradient = surface_gradient(p, value);
+#endif
   // fields of any magnitude: the square of a gradient may be no float
   real largest = max(abs(gradient.x), max(abs(gradient.y), abs(gradient.z)));
   if (!(largest > real(0)) || largest > real(3e38)) return vec3r(0);

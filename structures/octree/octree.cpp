@@ -29,6 +29,7 @@ constexpr const char* kStartGridAccepted = "\"auto\", 0 (none), or a power of tw
 struct Options {
   bool paper_layout = false;
   bool paper_traversal = false;
+  bool store_gradients = true;
   int start_grid = kAutomatic;  ///< cells along the longest axis; 0: none
 };
 
@@ -595,6 +596,7 @@ class Octree final : public Encoding {
   std::vector<ParameterInfo> parameters() const override {
     return {{"layout", "what a node is made of", "wide", "\"wide\" or \"rgba8\""},
             {"traversal", "how a sample finds its cells", "fast", "\"fast\" or \"paper\""},
+            {"gradients", "of surfaces that are lit, where the layout has room", "stored", "\"stored\" or \"computed\""},
             {"start_grid", "cells along the longest axis of the grid in place of the upper levels", "auto", kStartGridAccepted}};
   }
   void check_parameters(const Json& parameters) const override { options(parameters); }
@@ -610,15 +612,16 @@ class Octree final : public Encoding {
 
 Options Octree::options(const Json& parameters) const {
   Options o;
-  const auto choose = [&](const char* name, const char* usual, const char* paper) {
+  const auto choose = [&](const char* name, const char* usual, const char* other) {
     const Json& value = parameters.at(name);
-    if (value != usual && value != paper)
+    if (value != usual && value != other)
       throw UsageError(
-          fmt::format("encoding octree: parameter {} is {}; accepted: \"{}\" or \"{}\"", name, value.dump(), usual, paper));
-    return value == paper;
+          fmt::format("encoding octree: parameter {} is {}; accepted: \"{}\" or \"{}\"", name, value.dump(), usual, other));
+    return value == other;
   };
   o.paper_layout = choose("layout", "wide", "rgba8");
   o.paper_traversal = choose("traversal", "fast", "paper");
+  o.store_gradients = !choose("gradients", "stored", "computed");
   if (parameters.at("start_grid") == "auto") return o;
   o.start_grid = integer_parameter(*this, parameters, "start_grid");
   if (o.start_grid != 0 && (o.start_grid < 2 || o.start_grid > 1024 || !std::has_single_bit(static_cast<unsigned>(o.start_grid))))
@@ -708,7 +711,8 @@ Plan Octree::plan(const AmrHierarchy& h, const BuildRequest& request, const Opti
   std::int64_t tree_bytes = 4 * p.node_slots * (p.node_words / tree.nodes);
   const std::int64_t fields = request.field_count();
   if (!o.paper_layout) tree_bytes += fields * 8 * p.value_slots * value_bytes;
-  plan_start_grid(h, request, o, tree, tree_bytes, p);
+  // beside the tree of one field without padding, so that it does not depend on where the tree stands
+  plan_start_grid(h, request, o, tree, 4 * p.node_words + (o.paper_layout ? 0 : 8 * tree.nodes * value_bytes), p);
   p.bytes = tree_bytes + (p.start_slots ? 8 : 4) * p.start_cells();
   if (p.lod_texture) p.bytes += fields * in_texture * value_bytes;
   if (p.validity) p.bytes += 4 * words_for_bits(8 * tree.nodes);
@@ -783,9 +787,11 @@ void add_shader_inputs(const Options& o, const Plan& p, const Tree& tree, Encode
   if (p.start_cells() > 0) field.integer_uniforms.emplace_back("u_octree_start", p.start);
 }
 
-std::vector<LeftOut> left_out(const BuildRequest& request, const Tree& tree, const Plan& p, bool missing) {
+std::vector<LeftOut> left_out(const BuildRequest& request, const Options& o, const Tree& tree, const Plan& p, bool missing) {
   const bool linear = request.needs.filter != Filter::nearest;
   std::vector<LeftOut> list;
+  if (o.paper_layout && !request.needs.gradients)
+    list.push_back({"gradients", "no surface is lit; their two channels stay empty", 0});
   if (!p.lod_texture)
     list.push_back(
         {"LOD texture",
@@ -810,7 +816,7 @@ EncodedField Octree::build(const AmrHierarchy& h, const BuildRequest& request) c
   std::vector<HostTexture> more = more_values(h, request, tree, o, p, field, subtrees, stores);
   const TreeReader reader(stores, o, p);
   if (p.start_cells() > 0) write_start_grid(tree, reader, p, stores);
-  const bool gradients = o.paper_layout && request.needs.gradients;
+  const bool gradients = o.paper_layout && o.store_gradients && request.needs.gradients;
   if (gradients) write_gradients(h, request, tree, reader, stores.nodes);
   if (p.ranges) write_ranges(h, request, tree, reader, field, stores.ranges);
   const std::int64_t leaves = h.leaf_cells() - h.statistics(request.field).cells_without_value;
@@ -821,7 +827,7 @@ EncodedField Octree::build(const AmrHierarchy& h, const BuildRequest& request) c
     t.roles = (t.holds_values ? stores.values : stores.lod).roles;
   }
   field.statistics = statistics(tree, p, counts);
-  field.left_out = left_out(request, tree, p, h.has_missing(request.field));
+  field.left_out = left_out(request, o, tree, p, h.has_missing(request.field));
   add_shader_inputs(o, p, tree, field);
   field.shader.defines.emplace_back("AMRTEX_OCTREE_GRADIENTS", gradients ? 1 : 0);
   for (HostTexture* t :
