@@ -53,6 +53,19 @@ struct Sampled {
   ProbeResult encoding_double, encoding_gl;
 };
 
+/// The same structure with a double payload: what the encoding itself does to the field. Layouts that
+/// hold samples of one format alone keep that.
+EncodedField build_exact(const Encoding& encoding, const AmrHierarchy& mesh, BuildRequest request) {
+  const Storage storage = request.storage;
+  request.storage = Storage::r64f;
+  try {
+    return encoding.build(mesh, request);
+  } catch (const UnsupportedError&) {
+    request.storage = storage;
+    return encoding.build(mesh, request);
+  }
+}
+
 std::vector<Sampled> sample(const Arguments& a) {
   const Encoding& encoding = find_encoding(a.encoding);
   BuildRequest request;
@@ -68,10 +81,7 @@ std::vector<Sampled> sample(const Arguments& a) {
   const EncodedField field = encoding.build(mesh, request);
   const GpuField gpu(field, *context);
 
-  // the same structure with a double payload: what the encoding itself does to the field
-  BuildRequest exact = request;
-  exact.storage = Storage::r64f;
-  const EncodedField exact_field = encoding.build(mesh, exact);
+  const EncodedField exact_field = build_exact(encoding, mesh, request);
   const HierarchyReference reference(mesh, request.field, field.definition);
 
   std::vector<Sampled> samples;

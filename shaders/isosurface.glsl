@@ -72,24 +72,28 @@ STRUCT Crossing {
 };
 
 // Bisection through sample_field, then one secant: for a jump of f the last bracket, for a
-// smooth f far better.
+// smooth f far better. One loop, its first two turns the ends: a shader holds the encoding's
+// text once for each place that samples.
 Crossing find_crossing(IN(Ray) ray, IN(Accumulation) a, IN(real) isovalue, IN(bool) rising) {
   Crossing c;
-  FieldSample s;
+  c.found = true;
+  c.value_before = real(0);
+  c.value_after = real(0);
   ray_real from = a.before;
   ray_real to = a.after;
-  c.found = sample_field(make_position(ray.entry + ray.direction * from), s);
-  c.value_before = s.value;
-  c.found = sample_field(make_position(ray.entry + ray.direction * to), s) && c.found;
-  c.value_after = s.value;
-  real low = c.value_before;
-  real high = c.value_after;
-  for (int i = 0; i < u_bisections; ++i) {
-    ray_real middle = (from + to) * ray_real(0.5);
-    bool beyond = sample_field(make_position(ray.entry + ray.direction * middle), s) && (s.value >= isovalue) == rising;
-    from = beyond ? from : middle;
+  real low = real(0);
+  real high = real(0);
+  for (int i = 0; i < u_bisections + 2; ++i) {
+    ray_real t = i == 0 ? from : (i == 1 ? to : (from + to) * ray_real(0.5));
+    FieldSample s;
+    bool has_value = sample_field(make_position(ray.entry + ray.direction * t), s);
+    bool beyond = i == 1 || (i > 1 && has_value && (s.value >= isovalue) == rising);
+    if (i < 2) c.found = c.found && has_value;
+    if (i == 0) c.value_before = s.value;
+    if (i == 1) c.value_after = s.value;
+    from = beyond ? from : t;
     low = beyond ? low : s.value;
-    to = beyond ? middle : to;
+    to = beyond ? t : to;
     high = beyond ? s.value : high;
   }
   real rise = high - low;
@@ -111,23 +115,31 @@ Position moved(IN(Position) p, IN(int) axis, IN(int) cells, IN(real) part) {
 // Gradient at p, per unit of ray length along each axis: central differences over the width of
 // one cell of the region that holds p. Surfaces of `nearest` are faces: a little more than what
 // a hit may be off its face, to either side, sees which. A side without a value is left out.
-vec3r surface_gradient(IN(Position) p, IN(real) value) {
-  vec3r gradient = vec3r(0);
-  Region r;
-  if (!locate(p, r)) return gradient;
+vec3r surface_gradient(IN(Position) p, IN(real) isovalue) {
   bool faces = AMRTEX_FILTER == AMRTEX_FILTER_NEAREST;
-  int cells = faces ? 0 : r.width;
-  real part = faces ? u_face_distance : real(0);
-  real distance = faces ? u_face_distance : real(r.width);
-  for (int axis = 0; axis < 3; ++axis) {
-    FieldSample lower;
-    FieldSample upper;
-    bool has_lower = sample_field(moved(p, axis, -cells, -part), lower);
-    bool has_upper = sample_field(moved(p, axis, cells, part), upper);
-    real length = distance * ((has_lower ? real(1) : real(0)) + (has_upper ? real(1) : real(0)));
-    real difference = (has_upper ? upper.value : value) - (has_lower ? lower.value : value);
-    gradient[axis] = length > real(0) ? difference / length * real(u_cells_per_unit[axis]) : real(0);
+  vec3r difference = vec3r(0);
+  vec3r extent = vec3r(0);
+  real center = isovalue;
+  int cells = 0;
+  real distance = u_face_distance;
+  for (int i = 0; i < 7; ++i) {  // p itself, then its two sides along each axis
+    int axis = max(i - 1, 0) >> 1;
+    int side = i == 0 ? 0 : ((i & 1) != 0 ? -1 : 1);
+    FieldSample s;
+    bool has_value = sample_field(moved(p, axis, side * cells, faces ? real(side) * u_face_distance : real(0)), s);
+    if (i == 0) {
+      center = has_value ? s.value : isovalue;
+      int width = s.level < 0 ? 0 : level_width(s.level);
+      cells = faces ? 0 : width;
+      distance = faces ? u_face_distance : real(width);
+    } else {
+      difference[axis] += real(side) * (has_value ? s.value : center);
+      extent[axis] += has_value ? distance : real(0);
+    }
   }
+  vec3r gradient = vec3r(0);
+  for (int axis = 0; axis < 3; ++axis)
+    if (extent[axis] > real(0)) gradient[axis] = difference[axis] / extent[axis] * real(u_cells_per_unit[axis]);
   return gradient;
 }
 
@@ -141,13 +153,13 @@ vec3r stored_gradient(IN(Position) p) {
 #endif
 
 // Unit normal, along the gradient; 0 where there is no gradient.
-vec3r surface_normal(IN(Position) p, IN(real) value) {
+vec3r surface_normal(IN(Position) p, IN(real) isovalue) {
   vec3r gradient = vec3r(0);
 #if AMRTEX_FETCH_GRADIENT
   if (AMRTEX_STORED_GRADIENTS) gradient = stored_gradient(p);
-  else gradient = surface_gradient(p, value);
+  else gradient = surface_gradient(p, isovalue);
 #else
-  gradient = surface_gradient(p, value);
+  gradient = surface_gradient(p, isovalue);
 #endif
   // fields of any magnitude: the square of a gradient may be no float
   real largest = max(abs(gradient.x), max(abs(gradient.y), abs(gradient.z)));
@@ -157,7 +169,7 @@ vec3r surface_normal(IN(Position) p, IN(real) value) {
 
 // Light that comes back from a surface: a lamp at the eye, both sides alike (surface_light in renderers/scene.hpp).
 real reflected_light(IN(Ray) ray, IN(vec3r) normal) {
-  if (AMRTEX_SHADING == 0 || normal == vec3r(0)) return real(1);
+  if (normal == vec3r(0)) return real(1);
   vec3r direction = vec3r(ray.direction) / vec3r(u_cells_per_unit);
   return u_surface_ambient + (real(1) - u_surface_ambient) * abs(dot(normal, direction));
 }
@@ -198,11 +210,8 @@ vec3r surface_color(IN(Position) p, IN(int) k) {
 }
 
 void composite_surface(IN(Ray) ray, INOUT(Accumulation) a, IN(Position) p, IN(int) k) {
-  FieldSample s;
-  bool found = sample_field(p, s);
-  vec3r normal = vec3r(0);
-  if (AMRTEX_SHADING != 0) normal = surface_normal(p, found ? s.value : u_isovalues[k]);
-  vec3r rgb = surface_color(p, k) * reflected_light(ray, normal);
+  vec3r rgb = surface_color(p, k);
+  if (AMRTEX_SHADING != 0) rgb = rgb * reflected_light(ray, surface_normal(p, u_isovalues[k]));
   add_compensated(a, u_surface_light[4 * k + 3]);
   real transmittance = min(exp(-a.sum), a.transmittance);
   a.color += rgb * (a.transmittance - transmittance);
@@ -219,11 +228,7 @@ void draw_surface(IN(Ray) ray, INOUT(Accumulation) a) {
   if (!c.found) return;
   Position p = make_position(ray.entry + ray.direction * c.t);
   if (AMRTEX_OUTPUT == AMRTEX_OUTPUT_DEPTH) a.surface = vec4r(real(ray.start + c.t) * u_length_unit, real(0), real(0), real(1));
-  if (AMRTEX_OUTPUT == AMRTEX_OUTPUT_NORMAL) {
-    FieldSample s;
-    bool found = sample_field(p, s);
-    a.surface = vec4r(surface_normal(p, found ? s.value : u_isovalues[k]), real(1));
-  }
+  if (AMRTEX_OUTPUT == AMRTEX_OUTPUT_NORMAL) a.surface = vec4r(surface_normal(p, u_isovalues[k]), real(1));
   if (AMRTEX_OUTPUT != AMRTEX_OUTPUT_COLOR) return;
   // the part of an interval between its end and the surface is moved to the other side of it
   real shift = real(c.t - a.between);
