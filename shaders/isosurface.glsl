@@ -186,25 +186,15 @@ void shift_volume(INOUT(Accumulation) a, IN(real) value, IN(real) length) {
 }
 
 #if AMRTEX_CPP || AMRTEX_SURFACE_POINTS > 0
-UNIFORM_ARRAY(real, u_surface_points, 5 * AMRTEX_SURFACE_POINTS, 80)  // as u_color_points, over field 1
-
-vec3r mapped_color(IN(real) value) {
-  real x = value;
-  if (AMRTEX_SURFACE_LOGARITHMIC != 0) x = log2(max(value, real(1e-37))) * real(0.30102999566398119521);
-  vec3r rgb = vec3r(u_surface_points[2], u_surface_points[3], u_surface_points[4]);
-  for (int i = 1; i < AMRTEX_SURFACE_POINTS; ++i) {
-    real done = clamp((x - u_surface_points[5 * i]) * u_surface_points[5 * i + 1] + real(1), real(0), real(1));
-    rgb += vec3r(u_surface_points[5 * i + 2], u_surface_points[5 * i + 3], u_surface_points[5 * i + 4]) * done;
-  }
-  return rgb;
-}
+UNIFORM_ARRAY(real, u_surface_points, 5 * AMRTEX_SURFACE_POINTS, 80)  // see AMRTEX_COLOR_CURVE
+AMRTEX_COLOR_CURVE(mapped_color, u_surface_points, AMRTEX_SURFACE_POINTS)
 #endif
 
 // Colour of field 1 at p; the isovalue's own where there is no such field, or no value of it.
 vec3r surface_color(IN(Position) p, IN(int) k) {
 #if AMRTEX_CPP || AMRTEX_SURFACE_POINTS > 0
   FieldSample s;
-  if (AMRTEX_SURFACE_POINTS > 0 && sample_value(p, 1, s)) return mapped_color(s.value);
+  if (AMRTEX_SURFACE_POINTS > 0 && sample_value(p, 1, s)) return mapped_color(curve_axis(s.value, AMRTEX_SURFACE_LOGARITHMIC != 0));
 #endif
   return vec3r(u_surface_light[4 * k], u_surface_light[4 * k + 1], u_surface_light[4 * k + 2]);
 }

@@ -25,14 +25,27 @@ UNIFORM_ARRAY(real, u_invisible_ranges, 2 * AMRTEX_INVISIBLE_RANGES, 16)  // fir
 #endif
 
 // The value, or its log10: where the points stand.
-real transfer_axis(IN(real) value) {
-  if (AMRTEX_LOGARITHMIC == 0) return value;
+real curve_axis(IN(real) value, IN(bool) logarithmic) {
+  if (!logarithmic) return value;
   return log2(max(value, real(1e-37))) * real(0.30102999566398119521);
 }
+real transfer_axis(IN(real) value) { return curve_axis(value, AMRTEX_LOGARITHMIC != 0); }
+
+// A function of that name: colour over an axis, from an array of `count` points of 5 numbers: axis value,
+// 1 / distance from the one before, rgb less that one's.
+#define AMRTEX_COLOR_CURVE(name, points, count)                                                       \
+  vec3r name(IN(real) x) {                                                                            \
+    vec3r rgb = vec3r(points[2], points[3], points[4]);                                               \
+    for (int i = 1; i < count; ++i) {                                                                 \
+      real done = clamp((x - points[5 * i]) * points[5 * i + 1] + real(1), real(0), real(1));         \
+      rgb += vec3r(points[5 * i + 2], points[5 * i + 3], points[5 * i + 4]) * done;                   \
+    }                                                                                                 \
+    return rgb;                                                                                       \
+  }
 
 #if AMRTEX_CPP || AMRTEX_EXTINCTION_POINTS > 0
 UNIFORM_ARRAY(real, u_extinction_points, 3 * AMRTEX_EXTINCTION_POINTS, 48)  // axis value, extinction, slope to the next point
-UNIFORM_ARRAY(real, u_color_points, 5 * AMRTEX_COLOR_POINTS, 80)            // axis value, 1 / distance from the one before, rgb less that one's
+UNIFORM_ARRAY(real, u_color_points, 5 * AMRTEX_COLOR_POINTS, 80)            // see AMRTEX_COLOR_CURVE
 
 // Extinction per unit of ray length. A segment's end is replaced by the next one's beginning,
 // so that between two points of extinction 0 it is exactly 0.
@@ -45,14 +58,7 @@ real points_extinction(IN(real) x) {
   return kappa;
 }
 
-vec3r points_color(IN(real) x) {
-  vec3r rgb = vec3r(u_color_points[2], u_color_points[3], u_color_points[4]);
-  for (int i = 1; i < AMRTEX_COLOR_POINTS; ++i) {
-    real done = clamp((x - u_color_points[5 * i]) * u_color_points[5 * i + 1] + real(1), real(0), real(1));
-    rgb += vec3r(u_color_points[5 * i + 2], u_color_points[5 * i + 3], u_color_points[5 * i + 4]) * done;
-  }
-  return rgb;
-}
+AMRTEX_COLOR_CURVE(points_color, u_color_points, AMRTEX_COLOR_POINTS)
 #endif
 
 #if AMRTEX_CPP || AMRTEX_EXTINCTION_POINTS == 0
