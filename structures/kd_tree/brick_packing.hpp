@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -18,6 +19,8 @@ namespace amrtex::kd {
 inline constexpr int kPreferredEdge = 1024;
 /// A pool this full is good enough to look no further.
 inline constexpr double kEnoughFill = 0.97;
+/// More bricks than this are packed in layers: empty boxes of a whole container would be too many to search.
+inline constexpr std::size_t kManyBricks = 2000;
 
 struct Packing {
   Vec3i size{0};          ///< of the pool, texels; 0: the bricks do not fit
@@ -127,14 +130,21 @@ class EmptySpacePacker {
     Packing p;
     p.at.resize(bricks_.size());
     for (const std::size_t i : order) {
-      const Box* space = choose(bricks_[i], p.size.z, tight);
-      if (space == nullptr || work_ > most_work) return {};
-      p.at[i] = space->lower;
-      const Box placed{space->lower, space->lower + bricks_[i]};
-      p.size = glm::max(p.size, placed.upper);
-      occupy(placed);
+      const std::optional<Vec3i> at = place(bricks_[i], p.size.z, tight);
+      if (!at || work_ > most_work) return {};
+      p.at[i] = *at;
+      p.size = glm::max(p.size, *at + bricks_[i]);
     }
     return p;
+  }
+
+  /// Where the brick was put; nullopt where it finds no place. `height`: what the container is filled to already.
+  std::optional<Vec3i> place(const Vec3i& brick, int height, bool tight) {
+    const Box* space = choose(brick, height, tight);
+    if (space == nullptr) return std::nullopt;
+    const Vec3i at = space->lower;
+    occupy({at, at + brick});
+    return at;
   }
 
  private:
@@ -194,6 +204,31 @@ class EmptySpacePacker {
   std::int64_t& work_;
 };
 
+/// Thousands of bricks: layers as high as their highest brick, each filled with whatever fits of what is left. The
+/// bricks of a layer are of similar height, so that empty boxes are few and a layer is nearly full.
+inline Packing pack_layers(std::span<const Vec3i> bricks, std::vector<std::size_t> rest, int x, int y, int limit,
+                           std::int64_t& work) {
+  Packing p;
+  p.at.resize(bricks.size());
+  std::vector<std::size_t> left;
+  for (int z = 0; !rest.empty(); rest.swap(left)) {
+    const int height = bricks[rest.front()].z;
+    if (z + height > limit) return {};
+    left.clear();
+    EmptySpacePacker layer(bricks, x, y, height, work);
+    for (const std::size_t i : rest) {
+      const std::optional<Vec3i> at = layer.place(bricks[i], height, true);
+      if (at)
+        p.at[i] = *at + Vec3i(0, 0, z);
+      else
+        left.push_back(i);
+      if (at) p.size = glm::max(p.size, p.at[i] + bricks[i]);
+    }
+    z += height;
+  }
+  return p;
+}
+
 /// The default: NFDH, and while the pool is not full enough, maximal empty spaces in several containers and orders.
 /// `most_work` bounds the search by counted steps, not by time, so that a build has the same bytes everywhere.
 inline Packing pack_best_fit(std::span<const Vec3i> bricks, int limit, std::int64_t most_work = 400'000'000) {
@@ -213,6 +248,15 @@ inline Packing pack_best_fit(std::span<const Vec3i> bricks, int limit, std::int6
   Vec3i largest(1);
   for (const Vec3i& b : bricks) largest = glm::max(largest, b);
   std::int64_t work = 0;
+  for (const double f : {1.0, 0.8, 1.25, 0.65}) {
+    const int x = std::max(largest.x, static_cast<int>(edge * f));
+    const int y = std::max(largest.y, static_cast<int>(edge * f));
+    if (fill(best, bricks) >= kEnoughFill || work >= most_work) return best;
+    if (std::max(x, y) > limit) continue;
+    Packing p = pack_layers(bricks, orders.back(), x, y, limit, work);
+    if (p.better_than(best)) best = std::move(p);
+  }
+  if (bricks.size() > kManyBricks) return best;
   for (const double fx : {0.85, 0.7, 1.0, 0.6, 1.2})
     for (const double fy : {0.85, 0.7, 1.0, 0.6, 1.2})
       for (const bool tight : {false, true})

@@ -6,6 +6,7 @@
 
 #include <chrono>
 
+#include "renderers/raycaster.hpp"
 #include "structures/kd_tree/brick_packing.hpp"
 #include "structures/kd_tree/kd_partition.hpp"
 #include "structures/kd_tree/start_grid.hpp"
@@ -258,6 +259,13 @@ TEST(KdTreePacking, MixedBricksFillMostOfThePool) {
   }
 }
 
+TEST(KdTreePacking, ThousandsOfBricksArePackedInLayers) {
+  const auto bricks = mixed_boxes(1, 3000, 4, 20);
+  const kd::Packing best = kd::pack_best_fit(bricks, 2048);
+  expect_apart(best, bricks);
+  EXPECT_GE(kd::fill(best, bricks), 0.9);
+}
+
 TEST(KdTreePacking, EqualBricksLeaveAlmostNothing) {
   for (const int count : {1, 7, 64, 1000, 4173}) {
     const std::vector<Vec3i> bricks(static_cast<std::size_t>(count), Vec3i(18));
@@ -326,6 +334,33 @@ TEST(KdTree, TraversalsAndPackingsGiveTheSameBits) {
             compare(positions, values_of(expected), probe_on_cpu(h, other, Precision::single_precision, positions), 0.0);
         EXPECT_TRUE(same) << parameters.dump() << ": " << same;
       }
+    }
+  }
+}
+
+TEST(KdTree, TraversalsGiveTheSamePicture) {
+  Context& gl = context(ContextKind::egl);
+  for (const MeshBuilder& mesh : {nested(waves), holes_and_missing(waves, 3)}) {
+    const AmrHierarchy h = mesh.hierarchy();
+    Scene scene;
+    const Vec3d middle = (h.domain_lower() + h.domain_upper()) * 0.5;
+    scene.view.eye = middle + (h.domain_upper() - h.domain_lower()) * Vec3d(1.1, -1.7, 0.8);
+    scene.view.at = middle;
+    scene.transfer_function.extinction = {{0.5, 0}, {1, 20}};
+    scene.transfer_function.color = {{0, {1, 0.2, 0}}, {1, {0, 0.5, 1}}};
+    scene.settings.width = 60;
+    scene.settings.height = 48;
+    const auto draw = [&](const char* traversal, Filtering filtering) {
+      const EncodedField field = kd_field(h, Filter::linear_lod, {{"traversal", traversal}}, {.filtering = filtering});
+      const GpuField gpu(field, gl);
+      Raycaster raycaster(gl, h, field, gpu, scene);
+      raycaster.draw();
+      return raycaster.read().values;
+    };
+    for (const Filtering filtering : {Filtering::manual, Filtering::hardware}) {
+      const auto from_grid = draw("grid", filtering);
+      EXPECT_GT(*std::max_element(from_grid.begin(), from_grid.end()), 0);
+      EXPECT_EQ(draw("restart", filtering), from_grid);
     }
   }
 }
