@@ -1,0 +1,448 @@
+#include "kd_tree.hpp"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <map>
+
+#include "brick_packing.hpp"
+#include "kd_partition.hpp"
+#include "start_grid.hpp"
+#include "structures/build_tools.hpp"
+#include "structures/level_values.hpp"
+#include "structures/vertex_values.hpp"
+
+namespace amrtex {
+namespace {
+
+using namespace kd;
+
+constexpr std::array<Filter, 3> kFilters{Filter::nearest, Filter::linear_lod, Filter::linear_vertex};
+
+/// Values are read in blocks of at most so many cells along an axis.
+constexpr int kChunk = 32;
+/// A start grid takes at most this part of what tree and pool take.
+constexpr std::int64_t kGridShare = 16;
+
+struct Options {
+  bool paper_packing = false;
+  bool grid = true;
+  bool vertices = false;
+  int border = 0;  ///< texels before the first cell of a brick
+};
+
+/// What is stored of one subgrid: the box around its drawn leaves.
+struct Brick {
+  int level;
+  int patch;
+  Box cells;                ///< level space
+  std::vector<int> leaves;  ///< of the tree
+  Box texels(const Options& o) const { return o.vertices ? Box{cells.lower, cells.upper + Vec3i(1)} : cells.grown(o.border); }
+};
+
+struct Plan {
+  Tree tree;
+  std::vector<Brick> bricks;
+  std::vector<int> brick_of;  ///< a leaf
+  Packing packing;
+  StartGrid grid;
+  Vec3i position_bits{0};  ///< of a packed position
+  int data_words = 1;
+  std::int64_t validity_words = 0;
+  std::int64_t brick_texels = 0;
+  std::int64_t leaf_cells = 0;
+  std::int64_t node_count() const { return static_cast<std::int64_t>(tree.nodes.size()); }
+  std::int64_t leaf_count() const { return static_cast<std::int64_t>(tree.leaves.size()); }
+};
+
+std::vector<Brick> make_bricks(const Tree& tree, std::vector<int>& brick_of) {
+  std::map<std::pair<int, int>, int> known;  // level, patch
+  std::vector<Brick> bricks;
+  for (std::size_t i = 0; i < tree.leaves.size(); ++i) {
+    const Leaf& leaf = tree.leaves[i];
+    const auto [it, added] = known.try_emplace({leaf.level, leaf.patch}, static_cast<int>(bricks.size()));
+    if (added) bricks.push_back({leaf.level, leaf.patch, leaf.cells, {}});
+    Brick& brick = bricks[static_cast<std::size_t>(it->second)];
+    brick.cells = {glm::min(brick.cells.lower, leaf.cells.lower), glm::max(brick.cells.upper, leaf.cells.upper)};
+    brick.leaves.push_back(static_cast<int>(i));
+    brick_of.push_back(it->second);
+  }
+  return bricks;
+}
+
+/// Node-centred bricks lie side by side without a border: in a brick's last vertex the rounding of the
+/// normalised coordinate (3 times 2^-24 of the pool an axis) lets the texture unit see a little of the next brick.
+double leaked_value(const FieldStatistics& s, const Vec3i& pool) {
+  const double weight = 3 * std::ldexp(3.0, -24) * std::max({pool.x, pool.y, pool.z});
+  return weight * std::max({s.max - s.min, std::abs(s.min), std::abs(s.max)});
+}
+
+struct Stores {
+  std::vector<HostTexture> pools;  ///< one a field, all laid out in the same way
+  HostTexture data;
+  HostTexture validity;  ///< without data where every cell has a value
+};
+
+/// Writes the values, validity bits and ranges of bricks. One object a thread; a brick is one thread's.
+class BrickWriter {
+ public:
+  BrickWriter(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& plan, const EncodedField& field,
+              Stores& out)
+      : hierarchy_(h), request_(request), options_(o), plan_(plan), field_(field), out_(out) {
+    const HostTexture& pool = out.pools.front();
+    if (pool.hardware_linear && o.vertices) leak_ = leaked_value(h.statistics(request.field), pool.size);
+  }
+
+  void write(int brick) {
+    for (const int leaf : plan_.bricks[static_cast<std::size_t>(brick)].leaves)
+      for (int number = 0; number < field_.field_count; ++number) write_leaf(brick, leaf, number);
+  }
+
+ private:
+  void write_leaf(int brick, int leaf, int number) {
+    const Leaf& l = plan_.tree.leaves[static_cast<std::size_t>(leaf)];
+    range_ = {};
+    any_ = false;
+    for_each_cell({Vec3i(0), ceil_div(l.cells.size(), kChunk)}, [&](const Vec3i& i) {
+      const Vec3i lower = l.cells.lower + i * kChunk;
+      const Box chunk{lower, glm::min(lower + Vec3i(kChunk), l.cells.upper)};
+      read(l.level, chunk, request_.field_at(number));
+      store(brick, number);
+      note(leaf, chunk, number);
+    });
+    if (number == 0 && request_.needs.value_ranges) data_node(leaf)[1] = coded_range();
+  }
+
+  std::uint32_t* data_node(int leaf) const {
+    return out_.data.as<std::uint32_t>() + static_cast<std::ptrdiff_t>(leaf) * plan_.data_words;
+  }
+
+  /// All that the filter may read for a sample in the chunk.
+  void read(int level, const Box& chunk, int field) {
+    box_ = options_.vertices ? Box{chunk.lower, chunk.upper + Vec3i(1)} : chunk.grown(options_.border);
+    values_.resize(static_cast<std::size_t>(box_.cells()));
+    missing_.assign(values_.size(), 0);
+    if (!options_.vertices) return filled_level_values(hierarchy_, field, level, box_, values_, missing_);
+    vertex_values(hierarchy_, field, level, box_, values_);
+    if (!hierarchy_.has_missing(field)) return;
+    own_.resize(static_cast<std::size_t>(chunk.cells()));
+    level_values(hierarchy_, field, level, chunk, own_);
+    std::size_t i = 0;  // the flags belong to cells and stand at their lower vertex
+    for_each_cell(chunk, [&](const Vec3i& c) { missing_[box_.offset(c)] = std::isnan(own_[i++]) ? 1 : 0; });
+  }
+
+  void store(int brick, int number) {
+    const auto b = static_cast<std::size_t>(brick);
+    const Vec3i shift = plan_.packing.at[b] - plan_.bricks[b].texels(options_).lower;
+    HostTexture& pool = out_.pools[static_cast<std::size_t>(number)];
+    const Box all{Vec3i(0), pool.size};
+    const auto row = static_cast<std::size_t>(box_.size().x);
+    for (int z = box_.lower.z; z < box_.upper.z; ++z)
+      for (int y = box_.lower.y; y < box_.upper.y; ++y) {
+        const Vec3i first(box_.lower.x, y, z);
+        store_values(pool.format, field_.scale_of(number), &values_[box_.offset(first)], row, pool.data.data(),
+                     all.offset(first + shift));
+      }
+  }
+
+  /// Range and validity bits of what was read.
+  void note(int leaf, const Box& chunk, int number) {
+    for (const double v : values_) range_.add(v);
+    if (out_.validity.data.empty()) {
+      any_ = true;
+      return;
+    }
+    const Box cells = plan_.tree.leaves[static_cast<std::size_t>(leaf)].cells;
+    std::uint32_t* words =
+        out_.validity.as<std::uint32_t>() + data_node(leaf)[plan_.data_words - 1] + number * words_for_bits(cells.cells());
+    for_each_cell(chunk, [&](const Vec3i& c) {
+      if (missing_[box_.offset(c)] != 0) return;
+      any_ = true;
+      set_bit(words, static_cast<std::int64_t>(cells.offset(c)));
+    });
+  }
+
+  std::uint32_t coded_range() const {
+    if (!any_) return kVacantRange;
+    return encode_range({range_.min - leak_, range_.max + leak_}, field_.range_origin, request_.storage, field_.scale);
+  }
+
+  const AmrHierarchy& hierarchy_;
+  const BuildRequest& request_;
+  const Options& options_;
+  const Plan& plan_;
+  const EncodedField& field_;
+  Stores& out_;
+  double leak_ = 0;
+  Box box_;
+  std::vector<double> values_, own_;
+  std::vector<std::uint8_t> missing_;
+  ValueRange range_;
+  bool any_ = false;
+};
+
+class KdTree final : public Encoding {
+ public:
+  std::string_view name() const override { return "kd_tree"; }
+  std::span<const Filter> filters() const override { return kFilters; }
+  std::vector<ParameterInfo> parameters() const override {
+    return {
+        {"storage_kind", "where bricks are stored: in one texture, or each in its own", "pool", "\"pool\" or \"bindless\""},
+        {"packing", "how bricks are packed into the pool", "best_fit", "\"best_fit\" or \"nfdh\""},
+        {"traversal", "where the search for a leaf starts: at a grid's cell, or at the root", "grid", "\"grid\" or \"restart\""}};
+  }
+  void check_parameters(const Json& parameters) const override { options(parameters, Filter::nearest); }
+  Support supported(const ContextInfo&) const override { return {}; }
+  EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
+
+ private:
+  Options options(const Json& parameters, Filter filter) const;
+  Plan plan(const AmrHierarchy& h, const BuildRequest& request, const Options& o) const;
+  void plan_pool(const BuildRequest& request, const Options& o, Plan& p) const;
+  void require_sizes(const BuildRequest& request, const Plan& p) const;
+};
+
+Options KdTree::options(const Json& parameters, Filter filter) const {
+  const auto second = [&](const char* name, const char* first_value, const char* second_value) {
+    const Json& value = parameters.at(name);
+    if (value != first_value && value != second_value)
+      throw UsageError(fmt::format("encoding kd_tree: parameter {} is {}; accepted: \"{}\" or \"{}\"", name, value.dump(),
+                                   first_value, second_value));
+    return value == second_value;
+  };
+  second("storage_kind", "pool", "bindless");
+  Options o;
+  o.paper_packing = second("packing", "best_fit", "nfdh");
+  o.grid = !second("traversal", "grid", "restart");
+  o.vertices = filter == Filter::linear_vertex;
+  o.border = filter == Filter::linear_lod ? 1 : 0;
+  return o;
+}
+
+void KdTree::plan_pool(const BuildRequest& request, const Options& o, Plan& p) const {
+  std::vector<Vec3i> sizes;
+  Vec3i largest(1);
+  for (const Brick& b : p.bricks) {
+    sizes.push_back(b.texels(o).size());
+    largest = glm::max(largest, sizes.back());
+  }
+  p.brick_texels = used_texels(sizes);
+  const int limit = request.context.max_3d_texture_size;
+  if (sizes.empty())
+    p.packing.size = Vec3i(1);
+  else if (std::max({largest.x, largest.y, largest.z}) <= limit)
+    p.packing = o.paper_packing ? pack_nfdh(sizes, limit) : pack_best_fit(sizes, limit);
+  if (!p.packing.valid())
+    throw UnsupportedError(
+        fmt::format("encoding kd_tree: {} bricks of up to {} x {} x {} texels do not fit a 3D texture of {} texels an axis",
+                    sizes.size(), largest.x, largest.y, largest.z, limit));
+  for (int a = 0; a < 3; ++a) p.position_bits[a] = std::bit_width(static_cast<unsigned>(p.packing.size[a] - 1));
+  const int bits = p.position_bits.x + p.position_bits.y + p.position_bits.z;
+  if (bits > 32)
+    throw UnsupportedError(
+        fmt::format("encoding kd_tree: positions in a pool of {} x {} x {} texels take {} bits, a data node has 32",
+                    p.packing.size.x, p.packing.size.y, p.packing.size.z, bits));
+}
+
+/// Exact bytes against the limits of the context and of the user, before anything is allocated.
+void KdTree::require_sizes(const BuildRequest& request, const Plan& p) const {
+  const auto starts = static_cast<std::int64_t>(p.grid.nodes.size());
+  const std::array<std::pair<const char*, std::int64_t>, 5> buffers{
+      {{"nodes", 8 * p.node_count()},
+       {"data nodes", 4 * std::max<std::int64_t>(p.data_words * p.leaf_count(), 1)},
+       {"validity bits", 4 * p.validity_words},
+       {"the start grid", 4 * static_cast<std::int64_t>(p.grid.entries.size())},
+       {"the start grid's nodes", 32 * starts}}};
+  std::int64_t bytes = request.field_count() * p.packing.texels() * texel_bytes(request.storage);
+  for (const auto& [what, size] : buffers) {
+    if (size > request.context.max_buffer_bytes)
+      throw UnsupportedError(fmt::format("encoding kd_tree: {} take {} bytes, a buffer of this context at most {}", what, size,
+                                         request.context.max_buffer_bytes));
+    bytes += size;
+  }
+  require_budget(*this, bytes, request);
+}
+
+Plan KdTree::plan(const AmrHierarchy& h, const BuildRequest& request, const Options& o) const {
+  Plan p;
+  p.tree = build_tree(h);
+  p.bricks = make_bricks(p.tree, p.brick_of);
+  const bool validity = any_missing(h, request);
+  for (const Leaf& leaf : p.tree.leaves) {
+    p.leaf_cells += leaf.cells.cells();
+    if (validity) p.validity_words += request.field_count() * words_for_bits(leaf.cells.cells());
+  }
+  p.data_words = 1 + (request.needs.value_ranges ? 1 : 0) + (validity ? 1 : 0);
+  plan_pool(request, o, p);
+  if (o.grid) {
+    // of one field: the grid is the same for several
+    const std::int64_t others = p.packing.texels() * texel_bytes(request.storage) + 8 * p.node_count();
+    p.grid = make_start_grid(h, p.tree, std::max<std::int64_t>(others / kGridShare / 4, 1));
+  }
+  require_sizes(request, p);
+  return p;
+}
+
+Stores make_stores(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& p,
+                   const EncodedField& field) {
+  Stores out;
+  for (int number = 0; number < field.field_count; ++number) {
+    HostTexture& pool = out.pools.emplace_back(make_texture(element_name("tex_kd_pool", number), field.storage, p.packing.size));
+    pool.hardware_linear = field.filtering == Filtering::hardware;
+    pool.holds_values = true;
+    std::int64_t cells = 0;
+    for (const Brick& b : p.bricks) cells += b.cells.cells();
+    const int bytes = texel_bytes(pool.format);
+    pool.roles.payload = p.leaf_cells * bytes;
+    pool.roles.duplicated = (p.brick_texels - cells) * bytes;
+    pool.roles.padding = pool.bytes() - pool.roles.payload - pool.roles.duplicated;
+  }
+  out.data = make_buffer("kd_data", TexelFormat::r32ui, p.data_words * p.leaf_count());
+  const bool validity = any_missing(h, request);
+  if (validity) out.validity = make_buffer("kd_validity", TexelFormat::r32ui, p.validity_words);
+  auto* words = out.data.as<std::uint32_t>();
+  std::int64_t first_word_of_leaf = 0;
+  for (std::size_t i = 0; i < p.tree.leaves.size(); ++i, words += p.data_words) {
+    const Leaf& leaf = p.tree.leaves[i];
+    const auto brick = static_cast<std::size_t>(p.brick_of[i]);
+    const Vec3i at = p.packing.at[brick] + leaf.cells.lower - p.bricks[brick].texels(o).lower;
+    words[0] = static_cast<std::uint32_t>(at.x) | (static_cast<std::uint32_t>(at.y) << p.position_bits.x) |
+               (static_cast<std::uint32_t>(at.z) << (p.position_bits.x + p.position_bits.y));
+    if (!validity) continue;
+    words[p.data_words - 1] = static_cast<std::uint32_t>(first_word_of_leaf);
+    first_word_of_leaf += request.field_count() * words_for_bits(leaf.cells.cells());
+  }
+  return out;
+}
+
+Stores store_bricks(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& p,
+                    const EncodedField& field) {
+  Stores out = make_stores(h, request, o, p, field);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, p.bricks.size(), 1), [&](const auto& range) {
+    BrickWriter writer(h, request, o, p, field, out);
+    for (std::size_t i = range.begin(); i != range.end(); ++i) writer.write(static_cast<int>(i));
+  });
+  return out;
+}
+
+HostTexture make_nodes(const Tree& tree) {
+  HostTexture nodes = make_buffer("kd_nodes", TexelFormat::rg32ui, static_cast<std::int64_t>(tree.nodes.size()));
+  auto* words = nodes.as<std::uint32_t>();
+  for (const Node& n : tree.nodes) {
+    *words++ = first_word(n);
+    *words++ = second_word(n);
+  }
+  return nodes;
+}
+
+void add_start_grid(const AmrHierarchy& h, const Plan& p, EncodedField& field) {
+  HostTexture entries = make_buffer("kd_start", TexelFormat::r32ui, static_cast<std::int64_t>(p.grid.entries.size()));
+  std::copy(p.grid.entries.begin(), p.grid.entries.end(), entries.as<std::uint32_t>());
+  HostTexture nodes = make_buffer("kd_start_nodes", TexelFormat::rgba32ui, 2 * static_cast<std::int64_t>(p.grid.nodes.size()));
+  const std::vector<Box> boxes = node_boxes(h, p.tree);
+  auto* words = nodes.as<std::uint32_t>();
+  for (const std::uint32_t node : p.grid.nodes) {
+    for (int a = 0; a < 3; ++a) {
+      words[a] = static_cast<std::uint32_t>(boxes[node].lower[a]);
+      words[4 + a] = static_cast<std::uint32_t>(boxes[node].upper[a]);
+    }
+    words[3] = node;
+    words += 8;
+  }
+  field.textures.push_back(std::move(entries));
+  field.textures.push_back(std::move(nodes));
+  field.integer_uniforms.emplace_back("u_kd_grid", p.grid.cells);
+  field.integer_uniforms.emplace_back("u_kd_grid_width", Vec3i(p.grid.width, 0, 0));
+}
+
+void add_defines(const Options& o, const Plan& p, EncodedField& field) {
+  auto& defines = field.shader.defines;
+  defines.emplace_back("AMRTEX_KD_DEPTH", o.grid ? p.grid.depth : p.tree.depth);
+  defines.emplace_back("AMRTEX_KD_GRID", o.grid ? 1 : 0);
+  defines.emplace_back("AMRTEX_KD_VERTICES", o.vertices ? 1 : 0);
+  defines.emplace_back("AMRTEX_KD_DATA_WORDS", p.data_words);
+  defines.emplace_back("AMRTEX_KD_X_BITS", p.position_bits.x);
+  defines.emplace_back("AMRTEX_KD_Y_BITS", p.position_bits.y);
+  defines.emplace_back("AMRTEX_POOL_X", p.packing.size.x);
+  defines.emplace_back("AMRTEX_POOL_Y", p.packing.size.y);
+  defines.emplace_back("AMRTEX_POOL_Z", p.packing.size.z);
+}
+
+Json statistics(const Options& o, const Plan& p) {
+  const Tree& t = p.tree;
+  const auto bricks = static_cast<double>(std::max<std::size_t>(p.bricks.size(), 1));
+  Json json;
+  json["nodes"] = p.node_count();
+  json["fully_refined_nodes"] = t.fully_refined;
+  json["mixed_nodes"] = t.mixed;
+  json["leaves"] = p.leaf_count();
+  json["empty_leaves"] = t.empty;
+  json["depth"] = t.depth;
+  json["subgrids"] = t.subgrids;
+  json["cut_subgrids"] = t.cut_subgrids;
+  json["bricks"] = p.bricks.size();
+  json["leaves_a_brick"] = static_cast<double>(p.leaf_count()) / bricks;
+  json["pool"] = {p.packing.size.x, p.packing.size.y, p.packing.size.z};
+  json["fill"] = static_cast<double>(p.brick_texels) / static_cast<double>(p.packing.texels());
+  json["start_grid"] = o.grid ? Json{p.grid.cells.x, p.grid.cells.y, p.grid.cells.z} : Json(nullptr);
+  json["start_depth"] = o.grid ? p.grid.depth : t.depth;
+  return json;
+}
+
+/// Texels of subgrids that others refine everywhere, and of the parts of others around which no leaf cell lies.
+std::int64_t undrawn_cells(const AmrHierarchy& h, const Plan& p) {
+  std::int64_t cells = h.stored_cells();
+  for (const Brick& b : p.bricks) cells -= b.cells.cells();
+  return cells;
+}
+
+std::vector<LeftOut> left_out(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& p) {
+  std::vector<LeftOut> list;
+  const std::int64_t value_bytes = std::int64_t{request.field_count()} * texel_bytes(request.storage);
+  if (!any_missing(h, request)) {
+    std::int64_t words = p.leaf_count();
+    for (const Leaf& leaf : p.tree.leaves) words += request.field_count() * words_for_bits(leaf.cells.cells());
+    list.push_back({"validity bits", "every cell has a value", 4 * words});
+  }
+  if (!request.needs.value_ranges) list.push_back({"value ranges", "no region is skipped", 4 * p.leaf_count()});
+  if (const std::int64_t cells = undrawn_cells(h, p); cells > 0)
+    list.push_back({"refined parts of subgrids", "no level of detail is drawn", cells * value_bytes});
+  if (!o.vertices && o.border == 0) {
+    std::int64_t border = 0;
+    for (const Brick& b : p.bricks) border += b.cells.grown(1).cells() - b.cells.cells();
+    list.push_back({"border layer", "the filter nearest reads one cell", border * value_bytes});
+  }
+  return list;
+}
+
+EncodedField KdTree::build(const AmrHierarchy& h, const BuildRequest& request) const {
+  require_filter(*this, request.needs.filter);
+  require_fields(*this, h, request);
+  const Json parameters = complete_parameters(*this, request.parameters);
+  const Options o = options(parameters, request.needs.filter);
+  if (parameters.at("storage_kind") == "bindless")
+    throw UnsupportedError("encoding kd_tree: storage_kind bindless is not available in this version; accepted: pool");
+  const Plan p = plan(h, request, o);
+
+  EncodedField field = start_field(*this, h, request, parameters);
+  Stores stores = store_bricks(h, request, o, p, field);
+  field.statistics = statistics(o, p);
+  add_defines(o, p, field);
+  field.left_out = left_out(h, request, o, p);
+  field.textures.push_back(make_nodes(p.tree));
+  field.textures.push_back(std::move(stores.data));
+  if (o.grid) add_start_grid(h, p, field);
+  for (HostTexture& pool : stores.pools) field.textures.push_back(std::move(pool));
+  if (!stores.validity.data.empty()) field.textures.push_back(std::move(stores.validity));
+  field.host_peak_bytes = field.memory().total() + static_cast<std::int64_t>(p.tree.nodes.size() * (sizeof(Node) + sizeof(Box)));
+  return field;
+}
+
+}  // namespace
+
+std::unique_ptr<Encoding> make_kd_tree() { return std::make_unique<KdTree>(); }
+
+}  // namespace amrtex

@@ -1,0 +1,166 @@
+// kd_tree: a descent a region, one filtered fetch a sample and field. Words: kd_tree_layout.h.
+#include "kd_tree/kd_tree_layout.h"
+#if !AMRTEX_CPP
+#ifndef AMRTEX_KD_DEPTH
+#error AMRTEX_KD_DEPTH must be defined: splits from where a descent starts to the deepest leaf
+#endif
+#ifndef AMRTEX_KD_GRID
+#error AMRTEX_KD_GRID must be defined: 1 where descents start from a grid, 0 where from the root
+#endif
+#ifndef AMRTEX_KD_VERTICES
+#error AMRTEX_KD_VERTICES must be defined: 1 where texels are vertices, 0 where they are cells
+#endif
+#ifndef AMRTEX_KD_DATA_WORDS
+#error AMRTEX_KD_DATA_WORDS must be defined: words of a data node
+#endif
+#ifndef AMRTEX_KD_X_BITS
+#error AMRTEX_KD_X_BITS and AMRTEX_KD_Y_BITS must be defined: bits of x and y in a packed position
+#endif
+#ifndef AMRTEX_POOL_X
+#error AMRTEX_POOL_X, _Y and _Z must be defined: texels of the pool along each axis
+#endif
+#endif
+DEFINE_INT(AMRTEX_KD_DEPTH)
+DEFINE_INT(AMRTEX_KD_GRID)
+DEFINE_INT(AMRTEX_KD_VERTICES)
+DEFINE_INT(AMRTEX_KD_DATA_WORDS)
+DEFINE_INT(AMRTEX_KD_X_BITS)
+DEFINE_INT(AMRTEX_KD_Y_BITS)
+DEFINE_INT(AMRTEX_POOL_X)
+DEFINE_INT(AMRTEX_POOL_Y)
+DEFINE_INT(AMRTEX_POOL_Z)
+
+BUFFER(uvec2, kd_nodes, kd_nodes_block)
+BUFFER(uint, kd_data, kd_data_block)
+#if AMRTEX_CPP || AMRTEX_KD_GRID
+BUFFER(uint, kd_start, kd_start_block)               // a cell of the grid: where the boxes below tell its node
+BUFFER(uvec4, kd_start_nodes, kd_start_nodes_block)  // two a node: (lower corner, node), (upper corner, unused)
+UNIFORM(ivec3, u_kd_grid)                            // cells of the grid
+UNIFORM(ivec3, u_kd_grid_width)                      // x: width of a cell of the grid, finest cells
+#endif
+VALUE_TEXTURES(tex_kd_pool, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)
+#if AMRTEX_CPP || AMRTEX_VALIDITY
+BUFFER(uint, kd_validity, kd_validity_block)  // one bit a cell, each field of each data node from a new word
+#endif
+
+int kd_axis(IN(uvec2) node) { return int(node.x >> uint(AMRTEX_KD_CHILD_BITS + AMRTEX_KD_LEVEL_BITS)); }
+int kd_level(IN(uvec2) node) { return int((node.x >> uint(AMRTEX_KD_CHILD_BITS)) & uint((1 << AMRTEX_KD_LEVEL_BITS) - 1)); }
+int kd_first_child(IN(uvec2) node) { return int(node.x & uint((1 << AMRTEX_KD_CHILD_BITS) - 1)); }
+int kd_split(IN(uvec2) node) { return int(node.y >> uint(AMRTEX_KD_DATA_BITS)); }
+int kd_data_index(IN(uvec2) node) { return int(node.y & uint((1 << AMRTEX_KD_DATA_BITS) - 1)); }
+
+// Where the descent for a cell starts: a node, whose box r receives.
+int kd_begin(IN(ivec3) cell, INOUT(Region) r) {
+#if AMRTEX_CPP || AMRTEX_KD_GRID
+  if (AMRTEX_KD_GRID != 0) {
+    ivec3 g = divide_by_width(cell, u_kd_grid_width.x);
+    int start = int(kd_start[g.x + u_kd_grid.x * (g.y + u_kd_grid.y * g.z)]);
+    uvec4 lower = kd_start_nodes[start * 2];
+    uvec4 upper = kd_start_nodes[start * 2 + 1];
+    r.lower = ivec3(int(lower.x), int(lower.y), int(lower.z));
+    r.upper = ivec3(int(upper.x), int(upper.y), int(upper.z));
+    return int(lower.w);
+  }
+#endif
+  r.lower = ivec3(0);
+  r.upper = u_domain_cells;
+  return 0;
+}
+
+int kd_component(IN(ivec3) v, IN(int) axis) { return axis == 0 ? v.x : (axis == 1 ? v.y : v.z); }
+
+// The leaf that holds a cell; r.lower and r.upper become its box.
+uvec2 kd_find_leaf(IN(ivec3) cell, INOUT(Region) r) {
+  uvec2 node = kd_nodes[kd_begin(cell, r)];
+  int child = kd_first_child(node);
+  int steps = 0;
+  if (child != 0) {
+    do {
+      int axis = kd_axis(node);
+      int plane = kd_component(r.lower, axis) + kd_split(node) * level_width(kd_level(node));
+      bool above = kd_component(cell, axis) >= plane;
+      ivec3 along = ivec3(axis == 0 ? 1 : 0, axis == 1 ? 1 : 0, axis == 2 ? 1 : 0);
+      ivec3 others = ivec3(1) - along;
+      if (above) r.lower = r.lower * others + along * plane;
+      else r.upper = r.upper * others + along * plane;
+      node = kd_nodes[child + (above ? 1 : 0)];
+      child = kd_first_child(node);
+      steps += 1;
+    } while (child != 0 && steps < AMRTEX_KD_DEPTH);
+  }
+  return node;
+}
+
+ivec3 kd_pool_position(IN(uint) position) {
+  return ivec3(int(position & ((1u << uint(AMRTEX_KD_X_BITS)) - 1u)),
+               int((position >> uint(AMRTEX_KD_X_BITS)) & ((1u << uint(AMRTEX_KD_Y_BITS)) - 1u)),
+               int(position >> uint(AMRTEX_KD_X_BITS + AMRTEX_KD_Y_BITS)));
+}
+
+bool locate(IN(Position) p, OUT(Region) r) {
+  uvec2 node = kd_find_leaf(p.cell, r);
+  r.level = kd_level(node);
+  r.width = level_width(r.level);
+  r.value_range = vec2r(0);
+  r.handle = ivec4(0);
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+  r.texture_scale = vec3r(1.0 / float(AMRTEX_POOL_X), 1.0 / float(AMRTEX_POOL_Y), 1.0 / float(AMRTEX_POOL_Z));
+  r.texture_lower = vec3r(0);
+#endif
+  int data = kd_data_index(node);
+  if (data == AMRTEX_KD_NO_DATA) return false;
+  data *= AMRTEX_KD_DATA_WORDS;
+  ivec3 texel = kd_pool_position(kd_data[data]);
+  r.handle = ivec4(texel.x, texel.y, texel.z, 0);
+  if (AMRTEX_VALUE_RANGES != 0) r.value_range = decode_range(kd_data[data + 1]);
+  if (AMRTEX_VALIDITY != 0) r.handle.w = int(kd_data[data + AMRTEX_KD_DATA_WORDS - 1]);
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+  // a cell's centre is its texel's; a vertex sits on the corner, half a texel from its own
+  r.texture_lower = (vec3r(texel) + (AMRTEX_KD_VERTICES != 0 ? vec3r(0.5) : vec3r(0))) * r.texture_scale;
+#endif
+  return true;
+}
+
+// Cells of a region along each axis.
+ivec3 kd_cells(IN(Region) r) { return divide_by_width(r.upper - r.lower, r.width); }
+
+#if AMRTEX_CPP || AMRTEX_VALIDITY
+bool kd_has_value(IN(Region) r, IN(int) field, IN(ivec3) cell) {
+  ivec3 n = kd_cells(r);
+  ivec3 c = clamp(cell, ivec3(0), n - ivec3(1));
+  int bit = c.x + n.x * (c.y + n.y * c.z);
+  int words = (n.x * n.y * n.z + 31) >> 5;
+  return ((kd_validity[r.handle.w + field * words + (bit >> 5)] >> uint(bit & 31)) & 1u) != 0u;
+}
+#endif
+
+real kd_texel(IN(int) field, IN(ivec3) texel) { return texelFetch(tex_kd_pool[field], texel, 0).x; }
+
+real kd_stored_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
+  ivec3 first = ivec3(r.handle.x, r.handle.y, r.handle.z);
+  if (AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) {
+    ivec3 cell = clamp(ivec3(floor(q)), ivec3(0), kd_cells(r) - ivec3(1));
+    return decode_value(kd_texel(field, first + cell), field);
+  }
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+  return decode_value(textureLod(tex_kd_pool[field], r.texture_lower + q * r.texture_scale, 0.0).x, field);
+#else
+  // counted from the vertex, or from the centre of the cell before the region
+  PRECISE vec3r from_first = AMRTEX_KD_VERTICES != 0 ? q : q + vec3r(0.5);
+  int last = AMRTEX_KD_VERTICES != 0 ? 1 : 0;
+  vec3r whole = clamp(floor(from_first), vec3r(0), vec3r(kd_cells(r) - ivec3(last)));
+  vec3r f = from_first - whole;
+  ivec3 i = first + ivec3(whole) - ivec3(1 - last);
+  return decode_value(trilinear(kd_texel(field, i), kd_texel(field, i + ivec3(1, 0, 0)), kd_texel(field, i + ivec3(0, 1, 0)),
+                                kd_texel(field, i + ivec3(1, 1, 0)), kd_texel(field, i + ivec3(0, 0, 1)),
+                                kd_texel(field, i + ivec3(1, 0, 1)), kd_texel(field, i + ivec3(0, 1, 1)),
+                                kd_texel(field, i + ivec3(1, 1, 1)), f), field);
+#endif
+}
+
+real fetch_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
+#if AMRTEX_CPP || AMRTEX_VALIDITY
+  if (AMRTEX_VALIDITY != 0 && !kd_has_value(r, field, ivec3(floor(q)))) return no_value();
+#endif
+  return kd_stored_value(r, field, q);
+}

@@ -1,0 +1,20 @@
+// Shared by kd_tree.cpp and kd_tree.glsl.
+//
+// A node of the tree, two words of 32 bits (Kaehler & Abel 2013, section 3.3):
+//
+//   word 0   31  30 29     24 23                                0
+//            [axis ][ level  ][ first child                      ]   0: a leaf, since the root is node 0
+//   word 1   31            20 19                                0
+//            [ split          ][ data node                        ]   AMRTEX_KD_NO_DATA: nothing is drawn here
+//
+//   The second child is the node after the first. `split` is where the plane lies, in cells of the node's level from
+//   the node's lower corner. The first child is the one below the plane.
+//
+// A data node, AMRTEX_KD_DATA_WORDS words: where the texel of the node's lower cell (or vertex) lies in the pool, x in
+// the lowest bits, then y and z; then its coded value range, where regions are skipped; then its first word of validity
+// bits, where cells may have no value.
+#define AMRTEX_KD_CHILD_BITS 24
+#define AMRTEX_KD_LEVEL_BITS 6
+#define AMRTEX_KD_DATA_BITS 20
+#define AMRTEX_KD_SPLIT_BITS 12
+#define AMRTEX_KD_NO_DATA 0xfffff
