@@ -11,6 +11,7 @@
 #include "structures/kd_tree/kd_partition.hpp"
 #include "structures/kd_tree/start_grid.hpp"
 #include "structures/random_mesh.hpp"
+#include "structures/synthetic.hpp"
 #include "tests/encoding_cases.hpp"
 
 namespace amrtex {
@@ -362,6 +363,21 @@ TEST(KdTree, TraversalsGiveTheSamePicture) {
       EXPECT_GT(*std::max_element(from_grid.begin(), from_grid.end()), 0);
       EXPECT_EQ(draw("restart", filtering), from_grid);
     }
+  }
+}
+
+TEST(KdTree, ThirteenLevelsHoldTheField) {
+  // 16 * 2^12 = 65536 cells along an axis: no start grid reaches the finest subgrids
+  const AmrHierarchy h(generate_mesh(Json::parse(
+      R"({"field": {"type": "sum", "terms": [{"type": "linear", "gradient": [1, 2, 3]}, {"type": "blobs"}]},
+          "levels": 13, "root": 16, "patch": 4, "refine": {"criterion": "nested", "center": [0.51, 0.43, 0.62]}})")));
+  ASSERT_EQ(h.level_count(), 13);
+  const auto positions = probe_positions(h, 30);
+  for (const Filter filter : {Filter::nearest, Filter::linear_lod, Filter::linear_vertex}) {
+    const EncodedField field = kd_field(h, filter, Json::object(), {.storage = Storage::r64f});
+    EXPECT_GT(field.statistics["start_depth"], 0);
+    const Comparison result = compare_double(h, field, positions);
+    EXPECT_TRUE(result) << filter_name(filter) << ": " << result;
   }
 }
 
