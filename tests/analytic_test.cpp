@@ -293,9 +293,13 @@ TEST(SamePicture, LinearFiltersWhereTheirDefinitionsCoincide) {
 }
 
 TEST(SamePicture, WithAndWithoutSkipping) {
-  // a small bright place in a large mesh of nothing
+  // a small bright place in a large mesh of nothing; one of the patches holds nothing else
   const auto spot = [](const Vec3d& p) { return std::max(0.0, 1 - 4 * glm::length(p - Vec3d(0.3, 0.6, 0.55))); };
-  const AmrHierarchy h = MeshBuilder(Vec3i(40), {2}).root(spot).patch(1, {{16, 40, 36}, {32, 56, 52}}, spot).hierarchy();
+  const AmrHierarchy h = MeshBuilder(Vec3i(40), {2})
+                             .patch(0, {{0, 0, 0}, {24, 40, 40}}, spot)
+                             .patch(0, {{24, 0, 0}, {40, 40, 40}}, spot)
+                             .patch(1, {{16, 40, 36}, {32, 56, 52}}, spot)
+                             .hierarchy();
   for_each_filter([&](const EncodingCase& c) {
     for (const Filtering filtering : c.filterings())
       for (const Mode mode : {Mode::dvr, Mode::projection, Mode::mip}) {
