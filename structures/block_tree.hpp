@@ -24,6 +24,10 @@ struct BlockGrid {
   Vec3i blocks(int level) const { return ceil_div(cells(level), patch); }
   /// Cells of a block, level space.
   Box box(int level, const Vec3i& block) const;
+  /// Cells of a box of blocks, level space.
+  Box cells_of(int level, const Box& blocks) const {
+    return {box(level, blocks.lower).lower, box(level, blocks.upper - 1).upper};
+  }
   /// Blocks of the next finer level over a block.
   Box children(int level, const Vec3i& block) const;
 };

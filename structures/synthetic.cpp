@@ -10,6 +10,7 @@
 
 #include "analytic_fields.hpp"
 #include "block_tree.hpp"
+#include "cluster_blocks.hpp"
 #include "hash_random.hpp"
 #include "refine_criterion.hpp"
 #include "spec_reader.hpp"
@@ -41,6 +42,7 @@ struct MeshKeys {
   BlockGrid grid;
   TreeRules rules;
   Holes holes;
+  int longest_patch = 0;  ///< edge in blocks up to which blocks are joined into one patch
   double nan_fraction = 0;
   bool averaged = false;
   std::uint64_t seed = 1;
@@ -110,6 +112,13 @@ std::vector<bool> read_skipped(SpecReader& reader, int levels, int level_jump) {
   return skipped;
 }
 
+/// Edge in blocks up to which blocks are joined into one patch.
+int read_longest_patch(SpecReader& reader, int patch) {
+  const int cells = read_int(reader, "max_patch", patch, 1, kMaxPatch);
+  if (cells < patch) reader.refuse("max_patch", fmt::format("an integer from \"patch\" ({}) to {}", patch, kMaxPatch));
+  return cells / patch;
+}
+
 Holes read_holes(SpecReader& reader) {
   Holes holes;
   const Json* value = reader.find("holes");
@@ -135,6 +144,7 @@ MeshKeys read_mesh_keys(SpecReader& reader, const std::string& field_type) {
   keys.rules.level_jump = read_level_jump(reader, keys.grid.level_count());
   keys.rules.skipped = read_skipped(reader, keys.grid.level_count(), keys.rules.level_jump);
   keys.rules.max_cells = kMaxCells;
+  keys.longest_patch = read_longest_patch(reader, keys.grid.patch);
   keys.holes = read_holes(reader);
   keys.nan_fraction = reader.number("nan_fraction", 0, "a number from 0 to 1", is_fraction);
   keys.averaged = reader.boolean("averaged", false);
@@ -179,15 +189,15 @@ BlockTree make_tree(const MeshKeys& keys, const RefineCriterion& criterion, Bloc
   return tree;
 }
 
-/// Computes the values of blocks.
+/// Computes the values of patches.
 class ValueSource {
  public:
   /// `index` of the field among the mesh's: each has its own missing values.
   ValueSource(const MeshKeys& keys, const AnalyticField& field, std::size_t index)
       : keys_(keys), field_(field), missing_seed_(keys.seed + index) {}
 
-  std::vector<double> values(int level, const Vec3i& block) const {
-    const Box box = keys_.grid.box(level, block);
+  /// Of the cells of a box, level space.
+  std::vector<double> values(int level, const Box& box) const {
     std::vector<double> result(static_cast<std::size_t>(box.cells()));
     tbb::parallel_for(box.lower.z, box.upper.z, [&](int z) {
       const Box slab{{box.lower.x, box.lower.y, z}, {box.upper.x, box.upper.y, z + 1}};
@@ -261,12 +271,12 @@ NamedFields read_fields(SpecReader& reader, const Json& specification) {
 }
 
 std::vector<Patch> make_patches(const MeshKeys& keys, const BlockTree& tree, const NamedFields& fields, int level) {
-  const BlockList& blocks = tree.levels[static_cast<std::size_t>(level)];
-  std::vector<Patch> patches(blocks.size());
-  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
-    patches[i].box = keys.grid.box(level, blocks[i]);
+  const std::vector<Box> boxes = cluster_blocks(tree.levels[static_cast<std::size_t>(level)], keys.longest_patch);
+  std::vector<Patch> patches(boxes.size());
+  tbb::parallel_for(std::size_t{0}, boxes.size(), [&](std::size_t i) {
+    const Box& box = patches[i].box = keys.grid.cells_of(level, boxes[i]);
     for (std::size_t f = 0; f < fields.fields.size(); ++f)
-      patches[i].values.push_back(ValueSource(keys, *fields.fields[f], f).values(level, blocks[i]));
+      patches[i].values.push_back(ValueSource(keys, *fields.fields[f], f).values(level, box));
   });
   return patches;
 }

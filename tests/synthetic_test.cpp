@@ -13,6 +13,7 @@
 #include <set>
 #include <utility>
 
+#include "structures/cluster_blocks.hpp"
 #include "structures/random_mesh.hpp"
 
 namespace amrtex {
@@ -286,6 +287,39 @@ TEST(SkipLevels, MayBeTheCoarsest) {
   EXPECT_EQ(mesh.leaf_cells(1), 16 * 16 * 16);
 }
 
+TEST(MaxPatch, JoinsBlocksIntoPatchesOfMixedSizesAndChangesNoCell) {
+  Json specification = parse(R"({"field": "blobs", "levels": 3, "root": [20, 16, 12], "patch": 4,
+                                 "refine": {"criterion": "surface", "isovalue": 0.3}})");
+  const AmrHierarchy blocks = make_hierarchy(specification);
+  specification["max_patch"] = 14;  // three blocks
+  const AmrHierarchy joined = make_hierarchy(specification);
+  std::map<std::array<int, 4>, double> cells;
+  for_each_leaf(blocks, [&](int level, int, const Vec3i& c, double value) { cells[{level, c.x, c.y, c.z}] = value; });
+  for_each_leaf(joined, [&](int level, int, const Vec3i& c, double value) {
+    EXPECT_EQ(cells.at({level, c.x, c.y, c.z}), value);
+    cells.erase({level, c.x, c.y, c.z});
+  });
+  EXPECT_TRUE(cells.empty());
+  std::set<std::array<int, 3>> sizes;
+  for (int level = 0; level < joined.level_count(); ++level) {
+    EXPECT_LT(joined.patches(level).size(), blocks.patches(level).size() / 2);
+    for (const Patch& patch : joined.patches(level)) {
+      const Vec3i size = patch.box.size();
+      sizes.insert({size.x, size.y, size.z});
+      EXPECT_LE(std::max({size.x, size.y, size.z}), 12);
+    }
+  }
+  EXPECT_GE(sizes.size(), 8u);
+}
+
+TEST(MaxPatch, FindsTheBoxesThatBlocksWereMadeFrom) {
+  // two boxes that touch at an edge only, and one apart from them
+  const std::vector<Box> boxes{{{0, 0, 0}, {3, 2, 2}}, {{3, 2, 0}, {5, 6, 2}}, {{8, 0, 0}, {9, 1, 4}}};
+  BlockList blocks;
+  for (const Box& box : boxes) for_each_cell(box, [&](const Vec3i& b) { blocks.push_back(b); });
+  EXPECT_EQ(cluster_blocks(blocks, 8), boxes);
+}
+
 TEST(Generate, ClipsBlocksAtTheDomain) {
   const AmrHierarchy mesh =
       make_hierarchy(parse(R"({"field": "constant", "levels": 3, "root": [9, 5, 1], "ratio": [2, 4], "patch": 8,
@@ -452,6 +486,7 @@ TEST(BadSpecification, IsAUsageErrorThatNamesKeyValueAndWhatIsAccepted) {
       {R"({"patch": 0})", {"\"patch\"", "0", "an integer from 1"}},
       {R"({"patch": 5})", {"\"patch\"", "5", "\"ratio\""}},
       {R"({"root": 512, "patch": 1, "levels": 1})", {"\"patch\"", "1", "blocks"}},
+      {R"({"max_patch": 8})", {"\"max_patch\"", "8", "from \"patch\" (16) to 1024"}},
       {R"({"domain": {"lower": [0, 0, 0], "upper": [1, 0, 1]}})", {"\"domain\"", "an upper corner above"}},
       {R"({"domain": {"lowest": [0, 0, 0]}})", {"\"domain.lowest\"", "lower, upper"}},
       {R"({"domain": 1})", {"\"domain\"", "1", "a JSON object"}},
