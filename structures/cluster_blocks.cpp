@@ -82,32 +82,48 @@ Cut best_cut(Blocks blocks, const Box& box, bool full) {
   return {axis, box.lower[axis] + box.size()[axis] / 2};
 }
 
-void cluster(Blocks blocks, int longest_edge, std::vector<Box>& boxes) {
+void cluster(Blocks blocks, const ClusterRules& rules, std::vector<Box>& boxes) {
   if (blocks.empty()) return;
   const Box box = bounds(blocks);
-  const bool full = box.cells() == std::ssize(blocks);
+  const bool full = static_cast<double>(std::ssize(blocks)) >= rules.efficiency * static_cast<double>(box.cells());
   const Vec3i size = box.size();
-  if (full && std::max({size.x, size.y, size.z}) <= longest_edge) {
+  if (full && std::max({size.x, size.y, size.z}) <= rules.longest_edge) {
     boxes.push_back(box);
     return;
   }
   const Cut cut = best_cut(blocks, box, full);
   const auto middle = std::stable_partition(blocks.begin(), blocks.end(), [&](const Vec3i& b) { return b[cut.axis] < cut.at; });
-  cluster({blocks.begin(), middle}, longest_edge, boxes);
-  cluster({middle, blocks.end()}, longest_edge, boxes);
+  cluster({blocks.begin(), middle}, rules, boxes);
+  cluster({middle, blocks.end()}, rules, boxes);
 }
 
 }  // namespace
 
-std::vector<Box> cluster_blocks(BlockList blocks, int longest_edge) {
+std::vector<Box> cluster_blocks(BlockList blocks, const ClusterRules& rules) {
   std::vector<Box> boxes;
-  if (longest_edge == 1)
+  if (rules.longest_edge == 1)
     for (const Vec3i& b : blocks) boxes.push_back({b, b + 1});
   else
-    cluster(blocks, longest_edge, boxes);
+    cluster(blocks, rules, boxes);
   std::sort(boxes.begin(), boxes.end(), [](const Box& a, const Box& b) {
     return std::tie(a.lower.x, a.lower.y, a.lower.z) < std::tie(b.lower.x, b.lower.y, b.lower.z);
   });
+  return boxes;
+}
+
+std::vector<std::vector<Box>> cluster_tree(const BlockGrid& grid, const TreeRules& tree_rules, const ClusterRules& rules,
+                                           BlockTree& tree) {
+  std::vector<std::vector<Box>> boxes(tree.levels.size());
+  // from the finest level down: what a level's new blocks need lies on coarser levels
+  for (int level = grid.level_count() - 1; level >= 0; --level) {
+    const auto l = static_cast<std::size_t>(level);
+    boxes[l] = cluster_blocks(tree.levels[l], rules);
+    if (rules.efficiency == 1) continue;
+    BlockList filled;
+    for (const Box& box : boxes[l]) for_each_cell(box, [&](const Vec3i& b) { filled.push_back(b); });
+    tree.add(level, std::move(filled));
+    close_tree(grid, tree_rules, tree);
+  }
   return boxes;
 }
 

@@ -42,7 +42,7 @@ struct MeshKeys {
   BlockGrid grid;
   TreeRules rules;
   Holes holes;
-  int longest_patch = 0;  ///< edge in blocks up to which blocks are joined into one patch
+  ClusterRules patches;
   double nan_fraction = 0;
   bool averaged = false;
   std::uint64_t seed = 1;
@@ -112,11 +112,16 @@ std::vector<bool> read_skipped(SpecReader& reader, int levels, int level_jump) {
   return skipped;
 }
 
-/// Edge in blocks up to which blocks are joined into one patch.
-int read_longest_patch(SpecReader& reader, int patch) {
+/// How blocks are joined into patches.
+ClusterRules read_cluster_rules(SpecReader& reader, int patch) {
+  ClusterRules rules;
   const int cells = read_int(reader, "max_patch", patch, 1, kMaxPatch);
   if (cells < patch) reader.refuse("max_patch", fmt::format("an integer from \"patch\" ({}) to {}", patch, kMaxPatch));
-  return cells / patch;
+  rules.longest_edge = cells / patch;
+  rules.efficiency = reader.number("efficiency", 1, "a number above 0, at most 1", [](double e) { return e > 0 && e <= 1; });
+  const bool gaps = reader.find("holes") != nullptr || reader.find("skip_levels") != nullptr;
+  if (rules.efficiency < 1 && gaps) reader.refuse("efficiency", "1 beside \"holes\" or \"skip_levels\"");
+  return rules;
 }
 
 Holes read_holes(SpecReader& reader) {
@@ -144,7 +149,7 @@ MeshKeys read_mesh_keys(SpecReader& reader, const std::string& field_type) {
   keys.rules.level_jump = read_level_jump(reader, keys.grid.level_count());
   keys.rules.skipped = read_skipped(reader, keys.grid.level_count(), keys.rules.level_jump);
   keys.rules.max_cells = kMaxCells;
-  keys.longest_patch = read_longest_patch(reader, keys.grid.patch);
+  keys.patches = read_cluster_rules(reader, keys.grid.patch);
   keys.holes = read_holes(reader);
   keys.nan_fraction = reader.number("nan_fraction", 0, "a number from 0 to 1", is_fraction);
   keys.averaged = reader.boolean("averaged", false);
@@ -270,8 +275,8 @@ NamedFields read_fields(SpecReader& reader, const Json& specification) {
   return fields;
 }
 
-std::vector<Patch> make_patches(const MeshKeys& keys, const BlockTree& tree, const NamedFields& fields, int level) {
-  const std::vector<Box> boxes = cluster_blocks(tree.levels[static_cast<std::size_t>(level)], keys.longest_patch);
+/// `boxes` in blocks of the level.
+std::vector<Patch> make_patches(const MeshKeys& keys, const std::vector<Box>& boxes, const NamedFields& fields, int level) {
   std::vector<Patch> patches(boxes.size());
   tbb::parallel_for(std::size_t{0}, boxes.size(), [&](std::size_t i) {
     const Box& box = patches[i].box = keys.grid.cells_of(level, boxes[i]);
@@ -290,7 +295,8 @@ MeshDescription generate_mesh(const Json& specification) {
   const auto criterion = read_criterion(reader, keys.grid, keys.domain, *fields.fields.front(), keys.seed);
   reader.finish();
 
-  const BlockTree tree = make_tree(keys, *criterion, root_blocks(keys, reader));
+  BlockTree tree = make_tree(keys, *criterion, root_blocks(keys, reader));
+  const std::vector<std::vector<Box>> boxes = cluster_tree(keys.grid, keys.rules, keys.patches, tree);
   MeshDescription mesh;
   mesh.name = keys.name;
   mesh.domain_lower = keys.domain.lower;
@@ -299,8 +305,8 @@ MeshDescription generate_mesh(const Json& specification) {
   mesh.ratios = keys.grid.ratios;
   mesh.fields = fields.names;
   for (int level = 0; level < keys.grid.level_count(); ++level) {
-    const bool empty = keys.rules.skipped[static_cast<std::size_t>(level)];
-    mesh.levels.push_back(empty ? std::vector<Patch>() : make_patches(keys, tree, fields, level));
+    const auto l = static_cast<std::size_t>(level);
+    mesh.levels.push_back(keys.rules.skipped[l] ? std::vector<Patch>() : make_patches(keys, boxes[l], fields, level));
   }
   return mesh;
 }

@@ -317,7 +317,21 @@ TEST(MaxPatch, FindsTheBoxesThatBlocksWereMadeFrom) {
   const std::vector<Box> boxes{{{0, 0, 0}, {3, 2, 2}}, {{3, 2, 0}, {5, 6, 2}}, {{8, 0, 0}, {9, 1, 4}}};
   BlockList blocks;
   for (const Box& box : boxes) for_each_cell(box, [&](const Vec3i& b) { blocks.push_back(b); });
-  EXPECT_EQ(cluster_blocks(blocks, 8), boxes);
+  EXPECT_EQ(cluster_blocks(blocks, {8, 1}), boxes);
+}
+
+TEST(Efficiency, MakesFewerPatchesOfWhichAtLeastThatShareWasWanted) {
+  // an L of three blocks fills 3/4 of the box around it
+  const BlockList blocks{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  EXPECT_EQ(cluster_blocks(blocks, {8, 0.75}), (std::vector<Box>{{{0, 0, 0}, {2, 2, 1}}}));
+  EXPECT_EQ(cluster_blocks(blocks, {8, 0.76}).size(), 2u);
+  Json specification = parse(R"({"field": "blobs", "levels": 4, "root": 16, "patch": 4, "max_patch": 32,
+                                 "refine": {"criterion": "surface", "isovalue": 0.3}})");
+  const AmrHierarchy exact = make_hierarchy(specification);
+  specification["efficiency"] = 0.7;
+  const AmrHierarchy generous = make_hierarchy(specification);  // whose constructor checks the nesting of patches
+  EXPECT_LT(generous.patches(3).size(), exact.patches(3).size() / 2);
+  EXPECT_LE(static_cast<double>(generous.leaf_cells(3)), static_cast<double>(exact.leaf_cells(3)) / 0.7);
 }
 
 TEST(Generate, ClipsBlocksAtTheDomain) {
@@ -487,6 +501,8 @@ TEST(BadSpecification, IsAUsageErrorThatNamesKeyValueAndWhatIsAccepted) {
       {R"({"patch": 5})", {"\"patch\"", "5", "\"ratio\""}},
       {R"({"root": 512, "patch": 1, "levels": 1})", {"\"patch\"", "1", "blocks"}},
       {R"({"max_patch": 8})", {"\"max_patch\"", "8", "from \"patch\" (16) to 1024"}},
+      {R"({"efficiency": 0})", {"\"efficiency\"", "0", "above 0"}},
+      {R"({"efficiency": 0.5, "holes": 0.1})", {"\"efficiency\"", "0.5", "holes"}},
       {R"({"domain": {"lower": [0, 0, 0], "upper": [1, 0, 1]}})", {"\"domain\"", "an upper corner above"}},
       {R"({"domain": {"lowest": [0, 0, 0]}})", {"\"domain.lowest\"", "lower, upper"}},
       {R"({"domain": 1})", {"\"domain\"", "1", "a JSON object"}},
