@@ -308,7 +308,8 @@ Json timing_json(std::span<const double> samples_ms) {
 Json memory_json(const EncodedField& field, std::int64_t leaf_cells) {
   const MemoryByRole roles = field.memory();
   Json texels = Json::object();
-  for (const HostTexture& texture : field.textures) texels[texture.name] = texture.texels();
+  for (const HostTexture& texture : field.textures)  // textures of a set share a name
+    texels[texture.name] = texels.value(texture.name, std::int64_t{0}) + texture.texels();
   Json per_cell = nullptr;
   const std::int64_t values = leaf_cells * field.field_count;
   if (values > 0) per_cell = static_cast<double>(field.value_texels()) / static_cast<double>(values);

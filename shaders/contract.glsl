@@ -68,6 +68,7 @@ STRUCT Region {
   ivec4 handle;       // the encoding's own
   vec3r texture_lower;  // the encoding's own: texture coordinate of q = 0 (hardware filtering) ...
   vec3r texture_scale;  // ... and how much it grows with q
+  uvec4 brick;          // the encoding's own: handle of the texture that holds the region (x, y), and its number (z)
 };
 
 STRUCT FieldSample {

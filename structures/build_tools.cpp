@@ -105,15 +105,19 @@ bool any_missing(const AmrHierarchy& hierarchy, const BuildRequest& request) {
   return false;
 }
 
+Filtering stored_filtering(const BuildRequest& request) {
+  const bool linear = request.needs.filter != Filter::nearest;
+  return linear && request.storage != Storage::r64f ? request.needs.filtering : Filtering::manual;
+}
+
 EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request,
                          const Json& parameters) {
   require_fields(encoding, hierarchy, request);
   EncodedField field;
-  const bool linear = request.needs.filter != Filter::nearest;
   field.encoding = encoding.name();
   field.build_parameters = parameters;
   field.definition.filter = request.needs.filter;
-  field.filtering = linear && request.storage != Storage::r64f ? request.needs.filtering : Filtering::manual;
+  field.filtering = stored_filtering(request);
   field.storage = request.storage;
   const FieldStatistics& s = hierarchy.statistics(request.field);
   field.scale = storage_scale(request.storage, s.min, s.max);

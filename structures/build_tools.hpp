@@ -52,6 +52,9 @@ bool power_of_two_ratios(const AmrHierarchy& hierarchy);
 /// Must an encoding of the request's fields keep validity bits? One field with missing cells is enough.
 bool any_missing(const AmrHierarchy& hierarchy, const BuildRequest& request);
 
+/// What the built field is filtered by: `nearest` and r64f know no hardware filter.
+Filtering stored_filtering(const BuildRequest& request);
+
 /// Fields of EncodedField that are filled in the same way for every encoding.
 EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request,
                          const Json& parameters);

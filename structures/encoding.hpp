@@ -1,6 +1,7 @@
 // The C++ side of the sampler contract: what an encoding is to everybody else.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -43,8 +44,12 @@ struct ContextInfo {
   std::string renderer, version, vendor;
   int max_3d_texture_size = 2048;                         ///< texels along an axis
   std::int64_t max_buffer_bytes = std::int64_t{1} << 27;  ///< of one shader storage block
-  bool bindless_texture = false;
+  bool bindless_texture = true;                           ///< textures by handles; without a context they are fetched on the CPU
+  bool shader_ballot = true;
+  bool handles_may_differ = false;  ///< in one fetch, between invocations that run together; else each is served in turn
+  std::int64_t max_resident_handles = std::numeric_limits<std::int64_t>::max();  ///< textures reached by handles at a time
   std::vector<std::string> extensions;
+  bool has_handle_limit() const { return max_resident_handles != std::numeric_limits<std::int64_t>::max(); }
 };
 
 struct Support {
@@ -74,11 +79,19 @@ struct ParameterInfo {
   std::string accepted;  ///< for error messages: "an integer from 4 to 128"
 };
 
+/// A value of a parameter that a context cannot take.
+struct UnsupportedValue {
+  std::string parameter;
+  Json value;
+  std::string reason;
+};
+
 /// The shader's view of one built field: the file with its locate() and
 /// fetch_value(), and every define that the file requires.
 struct ShaderPart {
   std::string file;                                  ///< as known to the shader library, "page_table/page_table.glsl"
   std::vector<std::pair<std::string, int>> defines;  ///< name, value
+  std::vector<std::string> extensions = {};          ///< of GLSL, required
 };
 
 /// Built data: plain, independent of GL and of any consumer. One field of the mesh, or several
@@ -135,6 +148,8 @@ class Encoding {
   /// Throws UsageError for values that no mesh would make acceptable. `parameters` is complete.
   virtual void check_parameters(const Json& parameters) const = 0;
   virtual Support supported(const ContextInfo& context) const = 0;
+  /// Values of parameters that build() refuses for want of something in the context, for tables and messages.
+  virtual std::vector<UnsupportedValue> unsupported_values(const ContextInfo& /*context*/) const { return {}; }
   /// Builds the field. Throws UsageError for a bad parameter, UnsupportedError for
   /// a filter or a size that this encoding cannot take (naming what it can), and
   /// BudgetError before allocation when the result would pass the limits.

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cstdlib>
 #include <optional>
 #include <ostream>
 #include <random>
@@ -41,7 +42,28 @@ struct BuildOptions {
   bool value_ranges = true;
   int field = 0;
   std::vector<int> more_fields = {};
+  ContextKind context = ContextKind::egl;  ///< whose handles a structure may use
 };
+
+/// Made once a process; never destroyed, since the drivers' libraries may be gone by then.
+inline Context& context(ContextKind kind) {
+  static Context* const egl = make_context(ContextKind::egl).release();
+  if (kind == ContextKind::egl) return *egl;
+  static Context* const osmesa = make_context(ContextKind::osmesa).release();
+  return *osmesa;
+}
+inline constexpr std::array kContexts{ContextKind::egl, ContextKind::osmesa};
+
+/// A request's context with what the context says of handles of textures, and no other limit.
+inline ContextInfo handle_limits(ContextKind kind) {
+  const GlContextInfo& info = context(kind).info();
+  ContextInfo limits;
+  limits.bindless_texture = info.bindless_texture;
+  limits.shader_ballot = info.shader_ballot;
+  limits.handles_may_differ = info.handles_may_differ;
+  limits.max_resident_handles = info.max_resident_handles;
+  return limits;
+}
 
 /// Throws UnsupportedError for a mesh or combination that the encoding refuses.
 inline EncodedField build(const AmrHierarchy& h, const EncodingCase& c, const BuildOptions& options = {}) {
@@ -53,6 +75,7 @@ inline EncodedField build(const AmrHierarchy& h, const EncodingCase& c, const Bu
   request.needs.filtering = options.filtering;
   request.needs.value_ranges = options.value_ranges;
   request.parameters = c.parameters;
+  request.context = handle_limits(options.context);
   return c.encoding->build(h, request);
 }
 
@@ -124,25 +147,24 @@ inline std::vector<EncodingCase> variants(const Encoding& encoding, Filter filte
   return cases;
 }
 
+/// A word that the parameters of all cases must hold (environment AMRTEX_CASES): a slice for another driver.
+inline std::string case_slice() {
+  const char* word = std::getenv("AMRTEX_CASES");
+  return word == nullptr ? "" : word;
+}
+
 inline const std::vector<EncodingCase>& encoding_cases() {
   static const std::vector<EncodingCase> cases = [] {
     std::vector<EncodingCase> all;
     for (const Encoding* e : all_encodings())
       for (const Filter filter : e->filters())
-        for (EncodingCase& c : variants(*e, filter)) all.push_back(std::move(c));
+        for (EncodingCase& c : variants(*e, filter))
+          if (c.parameters.dump().find(case_slice()) != std::string::npos) all.push_back(std::move(c));
+    if (all.empty()) throw Error(fmt::format("AMRTEX_CASES={}: no case on this context", case_slice()));
     return all;
   }();
   return cases;
 }
-
-/// Made once a process; never destroyed, since the drivers' libraries may be gone by then.
-inline Context& context(ContextKind kind) {
-  static Context* const egl = make_context(ContextKind::egl).release();
-  if (kind == ContextKind::egl) return *egl;
-  static Context* const osmesa = make_context(ContextKind::osmesa).release();
-  return *osmesa;
-}
-inline constexpr std::array kContexts{ContextKind::egl, ContextKind::osmesa};
 
 // ---- positions ----
 

@@ -10,8 +10,8 @@
 //   The second child is the node after the first. `split` is where the plane lies, in cells of the node's level from
 //   the node's lower corner. The first child is the one below the plane.
 //
-// A data node, AMRTEX_KD_DATA_WORDS words: where the texel of the node's lower cell (or vertex) lies in the pool, x in
-// the lowest bits, then y and z; then its coded value range, where regions are skipped; then its first word of validity
+// A data node, AMRTEX_KD_DATA_WORDS words: where the texel of the node's lower cell (or vertex) lies in the pool or its
+// brick, x in the lowest bits, then y and z; then the number of its brick (bindless); then its coded value range, where regions are skipped; then its first word of validity
 // bits, where cells may have no value.
 #define AMRTEX_KD_CHILD_BITS 24
 #define AMRTEX_KD_LEVEL_BITS 6
