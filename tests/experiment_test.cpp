@@ -152,6 +152,18 @@ TEST(Experiment, RenderAxesViewsAndTransferFunctionsMultiply) {
   EXPECT_EQ(e.renders[3].settings.sampling, Sampling::adaptive);
 }
 
+TEST(Experiment, ConsumersAreAnAxisAndOnlySlicesHaveATarget) {
+  const Experiment e = parsed(with("render", R"({"mode": "projection",
+      "consumer": ["raycast", "multipass", "slices", "stencil_slices"], "slice_target": ["rgba32f", "rgba8"]})"));
+  std::vector<std::string> points;
+  for (const RenderPoint& r : e.renders) {
+    const Json json = render_json(r);
+    points.push_back(json["consumer"].get<std::string>() + " " + json.value("slice_target", "-"));
+  }
+  EXPECT_THAT(points, ElementsAre("raycast -", "multipass -", "slices rgba32f", "slices rgba8", "stencil_slices rgba32f",
+                                  "stencil_slices rgba8"));
+}
+
 TEST(Experiment, ValuesThatAreListsBecomeAxesAsListsOfLists) {
   Json json = Json::parse(kSmall);
   json["views"][0]["eye"] = Json::parse("[[3, 0, 0], [0, 3, 0]]");
