@@ -200,9 +200,9 @@ constexpr ColumnRule kColumns[] = {
 
 /// Measures that a table has unless others are chosen.
 bool is_default(const ColumnRule& rule) {
-  constexpr std::array<std::string_view, 11> on_demand = {"baseline",        "upload",         "rays",        "regions_skipped",
-                                                          "max_error",       "mrse",           "rmse_common", "pages",
-                                                          "border_overhead", "border_formula", "oversampling"};
+  constexpr std::array<std::string_view, 12> on_demand = {"baseline",        "upload",         "rays",         "regions_skipped",
+                                                          "max_error",       "mrse",           "rmse_common",  "pages",
+                                                          "border_overhead", "border_formula", "oversampling", "passes"};
   return std::find(on_demand.begin(), on_demand.end(), rule.key) == on_demand.end();
 }
 

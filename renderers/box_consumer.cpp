@@ -269,9 +269,9 @@ FrameTime BoxConsumer::draw() {
   bind(program_);
   context_->gl().Finish();
   const auto start = std::chrono::steady_clock::now();
-  timer_.begin();
   const Frame frame = make_frame();
   upload(frame);
+  timer_.begin();
   target_.bind();
   target_.clear(scene_.settings.mode == Mode::mip ? glm::vec4(kNoMaximum) : glm::vec4(0));
   set_blending(false);

@@ -135,8 +135,11 @@ struct NamedView {
 std::vector<NamedView> views() {
   View behind = perspective({0.45, 0.6, 0.55}, {1.5, 0.9, 0.7});  // from inside: boxes lie behind the eye and around it
   behind.fov_y = 80;
+  View far = perspective({30.1, -41.2, 21.7}, {0.5, 0.5, 0.5});  // beyond 16 diagonals: rays are held in double
+  far.fov_y = 2.2;
   return {{"askew", perspective({2.1, -1.2, 1.7}, {0.5, 0.5, 0.5})},
           {"inside", behind},
+          {"far", far},
           {"parallel", orthographic({0.5, 0.5, 0.5}, {1, -0.7, 0.4}, 1.8)},
           {"parallel from inside",
            [] {
@@ -152,7 +155,7 @@ std::vector<NamedView> views() {
 Scene cloud_scene(const View& view, ConsumerKind consumer, Sampling sampling = Sampling::lattice, Mode mode = Mode::dvr) {
   Scene scene;
   scene.view = view;
-  if (std::abs(view.at.z - view.eye.z) > 1) scene.view.up = {0, 1, 0};
+  if (view.at.x == view.eye.x && view.at.y == view.eye.y) scene.view.up = {0, 1, 0};
   scene.transfer_function = cloud();
   scene.settings.consumer = consumer;
   scene.settings.sampling = sampling;
@@ -254,7 +257,7 @@ TEST(Multipass, DrawsLineIntegralsMaximaAndPartsOfTheDomain) {
 // Lattice samples belong to the ray, so both take the same ones, and skip the same ones.
 TEST(Multipass, TakesTheRaycastersSamples) {
   const AmrHierarchy h = nested(waves).hierarchy();
-  for (const std::size_t view : {0, 1, 4})
+  for (const std::size_t view : {0, 1, 2, 5})
     for (const bool skip : {true, false}) {
       if (view != 0 && !skip) continue;
       const NamedView v = views()[view];
@@ -326,7 +329,7 @@ TEST(Slices, OneByOneTakeAPixelOnceWhereBoxesOverlap) {
 }
 
 // Every pixel of a slice is one box's: constant light, seen along an axis on slices in the middle of n intervals of length h,
-// gives C = c (1 - exp(-kappa n h)) to rounding, whatever the boxes.
+// gives C = c (1 - exp(-kappa n h)) to rounding, whatever the boxes; of the domain, or of the part that is drawn.
 TEST(Slices, AlongAnAxisGiveTheSlabsLight) {
   const double kappa = 3;
   const AmrHierarchy h = nested(constant(1)).hierarchy();
@@ -336,11 +339,15 @@ TEST(Slices, AlongAnAxisGiveTheSlabsLight) {
       scene.view.up = {0, 1, 0};
       scene.transfer_function = constant_light(kappa);
       scene.settings.step = 1;  // 32 finest cells along x and z
-      const Picture p = draw_scene(h, kd_case(Filter::nearest), scene);
-      const double alpha = 1 - std::exp(-kappa);
-      for (int y = 0; y < p.height; ++y) {
-        EXPECT_NEAR(p.pixel(20, y)[3], alpha, 2e-6);
-        EXPECT_NEAR(p.pixel(20, y)[0], 0.75 * alpha, 2e-6);
+      for (const bool part : {false, true}) {
+        if (part) scene.region = {Vec3d(0.25, 0, 0.25), Vec3d(0.75, 1, 0.75)};
+        const Picture p = draw_scene(h, kd_case(Filter::nearest), scene);
+        const double alpha = 1 - std::exp(-kappa * (part ? 0.5 : 1));
+        for (int y = 0; y < p.height; ++y) {
+          EXPECT_NEAR(p.pixel(20, y)[3], alpha, 2e-6);
+          EXPECT_NEAR(p.pixel(20, y)[0], 0.75 * alpha, 2e-6);
+        }
+        EXPECT_EQ(p.pixel(0, 16)[3], 0);
       }
     }
 }
