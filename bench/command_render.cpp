@@ -62,9 +62,9 @@ int run(const Arguments& a) {
     return 0;
   }
   const GpuField gpu(field, *context);
-  Raycaster raycaster(*context, mesh, field, gpu, drawn);
-  raycaster.draw();
-  write_picture(a, raycaster.read(), scene, mesh);
+  const auto consumer = make_consumer(*context, mesh, field, gpu, drawn);
+  consumer->draw();
+  write_picture(a, consumer->read(), scene, mesh);
   return 0;
 }
 

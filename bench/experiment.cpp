@@ -23,11 +23,10 @@ constexpr int kMaxPictureEdge = 16384;
 constexpr int kMaxFrames = 1000000;
 constexpr double kAnyNumber = std::numeric_limits<double>::max();
 
-constexpr std::array<std::string_view, 16> kAvailableRenderKeys = {
-    "mode",       "sampling",  "step",        "width",         "height",        "skip",    "early_end", "consumer",
-    "integrator", "isovalues", "iso_opacity", "surface_color", "iso_tolerance", "shading", "output",    "color_field"};
+constexpr std::array<std::string_view, 17> kAvailableRenderKeys = {
+    "mode",      "sampling",    "step",          "width",         "height",  "skip",   "early_end",   "consumer",    "integrator",
+    "isovalues", "iso_opacity", "surface_color", "iso_tolerance", "shading", "output", "color_field", "slice_target"};
 constexpr std::array<std::string_view, 4> kLaterRenderKeys = {"tolerance", "prune", "level_of_detail", "clip_planes"};
-constexpr std::array<std::string_view, 1> kConsumers = {"raycast"};
 constexpr std::array<std::string_view, 1> kIntegrators = {"exponential_midpoint"};
 constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
 
@@ -356,7 +355,8 @@ class Parser {
   static RenderPoint parse_setting(const Choice& choice) {
     RenderPoint point;
     for (const auto& [key, node] : choice) set(point, key, node);
-    if (!point.settings.draws_volume()) point.settings.early_end.reset();  // no opacity to end at
+    if (!point.settings.draws_volume()) point.settings.early_end.reset();                    // no opacity to end at
+    if (!point.settings.draws_slices()) point.settings.slice_target = SliceTarget::rgba32f;  // nothing is blended there
     if (point.settings.draws_surfaces())
       finish_surfaces(point.settings.isosurfaces, choice);
     else
@@ -418,7 +418,8 @@ class Parser {
     if (key == "height") s.height = static_cast<int>(node.integer(1, kMaxPictureEdge));
     if (key == "skip") s.skip = node.boolean();
     if (key == "early_end" && !node.json().is_null()) s.early_end = node.number(0, 1);
-    if (key == "consumer") point.consumer = node.one_of(kConsumers);
+    if (key == "consumer") s.consumer = located(node, [&] { return parse_consumer(node.text()); });
+    if (key == "slice_target") s.slice_target = located(node, [&] { return parse_slice_target(node.text()); });
     if (key == "integrator") point.integrator = node.one_of(kIntegrators);
   }
 
@@ -602,7 +603,7 @@ Json surfaces_json(const Isosurfaces& iso) {
 
 Json render_json(const RenderPoint& render) {
   const RenderSettings& s = render.settings;
-  Json json = {{"consumer", render.consumer},
+  Json json = {{"consumer", consumer_name(s.consumer)},
                {"mode", mode_name(s.mode)},
                {"sampling", sampling_name(s.sampling)},
                {"step", s.step},
@@ -615,6 +616,7 @@ Json render_json(const RenderPoint& render) {
                {"view_name", render.view_name},
                {"transfer_function", nullptr},
                {"transfer_function_name", nullptr}};
+  if (s.draws_slices()) json["slice_target"] = slice_target_name(s.slice_target);
   if (s.draws_surfaces()) json.update(surfaces_json(s.isosurfaces));
   if (!render.transfer_function_name.empty()) {
     json["transfer_function"] = to_json(render.transfer_function);

@@ -37,7 +37,6 @@ struct BuildPoint {
 /// One picture of every structure.
 struct RenderPoint {
   RenderSettings settings;
-  std::string consumer = "raycast";
   std::string integrator = "exponential_midpoint";
   View view;
   std::string view_name;               ///< as given, or "view 2": its place in the list

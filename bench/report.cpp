@@ -157,6 +157,7 @@ constexpr ColumnRule kColumns[] = {
     {"filtering", "filtering", "", Role::setting, false, value<"/filtering">},
     {"storage", "storage", "", Role::setting, false, value<"/storage">},
     {"consumer", "consumer", "", Role::setting, false, value<"/render/consumer">},
+    {"slice_target", "slice target", "", Role::setting, false, value<"/render/slice_target">},
     {"mode", "mode", "", Role::setting, false, value<"/render/mode">},
     {"sampling", "sampling", "", Role::setting, false, value<"/render/sampling">},
     {"step", "step (cells)", "", Role::setting, true, value<"/render/step">},
@@ -187,6 +188,7 @@ constexpr ColumnRule kColumns[] = {
     {"samples", "samples", "", Role::measure, true, value<"/work/samples">},
     {"regions", "regions", "", Role::measure, true, value<"/work/regions">},
     {"regions_skipped", "regions skipped", "", Role::measure, true, value<"/work/regions_skipped">},
+    {"passes", "passes", "", Role::measure, true, value<"/work/passes">},
     {"rmse", "RMSE", "", Role::measure, true, value<"/error/rmse">},
     {"max_error", "max error", "", Role::measure, true, value<"/error/max">},
     {"mrse", "MRSE", "", Role::measure, true, value<"/error/mrse">},
@@ -198,9 +200,9 @@ constexpr ColumnRule kColumns[] = {
 
 /// Measures that a table has unless others are chosen.
 bool is_default(const ColumnRule& rule) {
-  constexpr std::array<std::string_view, 11> on_demand = {"baseline",        "upload",         "rays",        "regions_skipped",
-                                                          "max_error",       "mrse",           "rmse_common", "pages",
-                                                          "border_overhead", "border_formula", "oversampling"};
+  constexpr std::array<std::string_view, 12> on_demand = {"baseline",        "upload",         "rays",         "regions_skipped",
+                                                          "max_error",       "mrse",           "rmse_common",  "pages",
+                                                          "border_overhead", "border_formula", "oversampling", "passes"};
   return std::find(on_demand.begin(), on_demand.end(), rule.key) == on_demand.end();
 }
 

@@ -80,7 +80,7 @@ class Runner {
   void load(std::size_t dataset) {
     if (mesh_ && loaded_ == dataset) return;
     baseline_.reset();
-    baseline_caster_.reset();
+    baseline_consumer_.reset();
     mesh_.emplace(load_dataset(experiment_, experiment_.datasets[dataset]));
     loaded_ = dataset;
     mesh_hash_ = mesh_->content_hash(0);
@@ -166,28 +166,33 @@ class Runner {
   void measure(const BuildPoint& build, Built& built, const RenderPoint& render) {
     const Scene scene = scene_of(experiment_, render);
     const Stopwatch first;
-    Raycaster raycaster(*context_, *mesh_, built.field, *built.gpu, scene);
-    raycaster.draw();
+    const auto consumer = make_consumer(*context_, *mesh_, built.field, *built.gpu, scene);
+    consumer->draw();
     const double first_frame_ms = first.seconds() * 1000;
-    const Picture picture = raycaster.read();
+    const Picture picture = consumer->read();
 
     Json record = blank_record(Status::ok);
     describe(record, build, render, &built);
     record["first_frame_ms"] = first_frame_ms;
     record["image_hash"] = picture_hash(picture);
-    record["context"]["shader_hash"] = raycaster.shader_hash();
+    record["context"]["shader_hash"] = consumer->shader_hash();
     for (const std::string& text : scene_warnings(*mesh_, scene)) warn(record, text);
-    if (!raycaster.transfer_exact())
+    if (scene.settings.slice_target == SliceTarget::rgba8)
+      warn(record, "slices were blended in 8 bits a channel (slice_target rgba8): a historical control");
+    if (!consumer->transfer_exact())
       warn(record, "the transfer function has more than 16 points: it is drawn from a table of 4096 bins");
     if (!add_errors(record, picture, built.field, scene)) {
       write(build, render, record);
       return;  // a wrong picture gets no time
     }
     write_png(picture, picture_path(build, render));
-    const WorkCounts work = raycaster.count();
-    record["work"] = {
-        {"rays", work.rays}, {"samples", work.samples}, {"regions", work.regions}, {"regions_skipped", work.regions_skipped}};
-    if (render.frames > 0) add_times(record, build, render, raycaster);
+    const WorkCounts work = consumer->count();
+    record["work"] = {{"rays", work.rays},
+                      {"samples", work.samples},
+                      {"regions", work.regions},
+                      {"regions_skipped", work.regions_skipped},
+                      {"passes", work.passes}};
+    if (render.frames > 0) add_times(record, build, render, *consumer);
     write(build, render, record);
   }
 
@@ -219,14 +224,14 @@ class Runner {
     return true;
   }
 
-  void add_times(Json& record, const BuildPoint& build, const RenderPoint& render, Raycaster& raycaster) {
+  void add_times(Json& record, const BuildPoint& build, const RenderPoint& render, Consumer& consumer) {
     std::vector<FrameTime> frames;
     double before = 0;
     double after = 0;
-    Raycaster* baseline = baseline_for(build, render);
+    Consumer* baseline = baseline_for(build, render);
     for (int tries = 0; tries < kTimingTries; ++tries) {
       before = baseline_ms(baseline);
-      frames = time_frames(raycaster, render.warm_up, render.frames);
+      frames = time_frames(consumer, render.warm_up, render.frames);
       after = baseline_ms(baseline);
       if (baseline == nullptr || std::abs(after - before) <= kBaselineDrift * std::min(before, after)) break;
     }
@@ -253,7 +258,7 @@ class Runner {
     record["frame"] = frame;
   }
 
-  double baseline_ms(Raycaster* baseline) {
+  double baseline_ms(Consumer* baseline) {
     if (baseline == nullptr) return 0;
     std::vector<double> wall;
     for (const FrameTime& f : time_frames(*baseline, 1, kBaselineFrames)) wall.push_back(f.wall_ms);
@@ -261,7 +266,7 @@ class Runner {
   }
 
   /// The experiment's first build with its first render settings, for the same view, when it asks for one.
-  Raycaster* baseline_for(const BuildPoint& build, const RenderPoint& render) {
+  Consumer* baseline_for(const BuildPoint& build, const RenderPoint& render) {
     if (!experiment_.baseline) return nullptr;
     const BuildPoint* first = nullptr;
     for (const BuildPoint& b : experiment_.builds)
@@ -273,12 +278,11 @@ class Runner {
     settings.transfer_function_name = render.transfer_function_name;
     const std::string key = render_json(settings).dump();
     if (!baseline_) baseline_ = make(*first, settings.settings);
-    if (!baseline_caster_ || key != baseline_key_) {
-      baseline_caster_ =
-          std::make_unique<Raycaster>(*context_, *mesh_, baseline_->field, *baseline_->gpu, scene_of(experiment_, settings));
+    if (!baseline_consumer_ || key != baseline_key_) {
+      baseline_consumer_ = make_consumer(*context_, *mesh_, baseline_->field, *baseline_->gpu, scene_of(experiment_, settings));
       baseline_key_ = key;
     }
-    return baseline_caster_.get();
+    return baseline_consumer_.get();
   }
 
   void describe(Json& record, const BuildPoint& build, const RenderPoint& render, const Built* built) {
@@ -348,7 +352,7 @@ class Runner {
   std::size_t loaded_ = 0;
   std::string mesh_hash_;
   std::unique_ptr<Built> baseline_;
-  std::unique_ptr<Raycaster> baseline_caster_;
+  std::unique_ptr<Consumer> baseline_consumer_;
   std::string baseline_key_;
 };
 

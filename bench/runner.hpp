@@ -8,7 +8,7 @@
 
 #include "bench/experiment.hpp"
 #include "renderers/context.hpp"
-#include "renderers/raycaster.hpp"
+#include "renderers/consumer.hpp"
 
 namespace amrtex {
 
@@ -48,6 +48,6 @@ Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definit
                          const std::filesystem::path& folder, std::string& hash);
 
 /// Frame times through Google Benchmark with manual time: `warm_up` frames are dropped.
-std::vector<FrameTime> time_frames(Raycaster& raycaster, int warm_up, int frames);
+std::vector<FrameTime> time_frames(Consumer& consumer, int warm_up, int frames);
 
 }  // namespace amrtex

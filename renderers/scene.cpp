@@ -202,6 +202,35 @@ int RenderSettings::picture_channels() const {
   return mode == Mode::dvr ? 4 : 1;
 }
 
+std::string_view consumer_name(ConsumerKind consumer) {
+  switch (consumer) {
+    case ConsumerKind::raycast:
+      return "raycast";
+    case ConsumerKind::multipass:
+      return "multipass";
+    case ConsumerKind::slices:
+      return "slices";
+    case ConsumerKind::stencil_slices:
+      return "stencil_slices";
+  }
+  return "";
+}
+
+std::string_view slice_target_name(SliceTarget target) { return target == SliceTarget::rgba32f ? "rgba32f" : "rgba8"; }
+
+ConsumerKind parse_consumer(std::string_view name) {
+  for (const ConsumerKind kind :
+       {ConsumerKind::raycast, ConsumerKind::multipass, ConsumerKind::slices, ConsumerKind::stencil_slices})
+    if (name == consumer_name(kind)) return kind;
+  throw UsageError(fmt::format("unknown consumer '{}'; accepted are raycast, multipass, slices, stencil_slices", name));
+}
+
+SliceTarget parse_slice_target(std::string_view name) {
+  for (const SliceTarget target : {SliceTarget::rgba32f, SliceTarget::rgba8})
+    if (name == slice_target_name(target)) return target;
+  throw UsageError(fmt::format("unknown slice_target '{}'; accepted are rgba32f, rgba8", name));
+}
+
 std::string_view sampling_name(Sampling sampling) { return sampling == Sampling::lattice ? "lattice" : "adaptive"; }
 
 Mode parse_mode(std::string_view name) {

@@ -73,6 +73,10 @@ void validate(const TransferFunction& transfer_function);
 /// `iso` draws isosurfaces, `dvr_iso` isosurfaces inside the volume.
 enum class Mode { dvr, projection, mip, iso, dvr_iso };
 enum class Sampling { lattice, adaptive };
+/// Who draws: the raycaster in one pass, or one of those that draw the field's boxes one by one (box_consumer.hpp).
+enum class ConsumerKind { raycast, multipass, slices, stencil_slices };
+/// What slices are blended in. Eight bits a channel are the historical control: 256 slices are off by 0.1.
+enum class SliceTarget { rgba32f, rgba8 };
 /// What a picture of isosurfaces holds: colour; world distance from the ray's origin to the first surface,
 /// 0 where there is none; or the unit normal there (the gradient's direction), alpha 1, else all 0.
 enum class Output { color, depth, normal };
@@ -80,11 +84,15 @@ enum class Output { color, depth, normal };
 enum class Shading { none, gradient };
 std::string_view mode_name(Mode mode);
 std::string_view sampling_name(Sampling sampling);
+std::string_view consumer_name(ConsumerKind consumer);
+std::string_view slice_target_name(SliceTarget target);
 std::string_view output_name(Output output);
 std::string_view shading_name(Shading shading);
 /// These throw UsageErrors that name the accepted ones.
 Mode parse_mode(std::string_view name);
 Sampling parse_sampling(std::string_view name);
+ConsumerKind parse_consumer(std::string_view name);
+SliceTarget parse_slice_target(std::string_view name);
 Output parse_output(std::string_view name);
 Shading parse_shading(std::string_view name);
 
@@ -106,6 +114,8 @@ struct Isosurfaces {
 void validate(const Isosurfaces& isosurfaces);
 
 struct RenderSettings {
+  ConsumerKind consumer = ConsumerKind::raycast;
+  SliceTarget slice_target = SliceTarget::rgba32f;  ///< consumers `slices` and `stencil_slices`
   Mode mode = Mode::dvr;
   Sampling sampling = Sampling::adaptive;
   double step = 1;                  ///< cell widths (smallest edge): of the finest level for lattice, of the region for adaptive
@@ -116,6 +126,7 @@ struct RenderSettings {
   Isosurfaces isosurfaces;
 
   bool draws_volume() const { return mode == Mode::dvr || (mode == Mode::dvr_iso && isosurfaces.output == Output::color); }
+  bool draws_slices() const { return consumer == ConsumerKind::slices || consumer == ConsumerKind::stencil_slices; }
   bool draws_surfaces() const { return mode == Mode::iso || mode == Mode::dvr_iso; }
   /// Premultiplied colour (4 channels), or one raw number.
   int picture_channels() const;

@@ -98,25 +98,15 @@ std::vector<double> numbers(const Vec3d& v) { return {v.x, v.y, v.z}; }
 
 void add_camera(const AmrHierarchy& h, const Scene& scene, UniformValues& uniforms) {
   const RenderSettings& s = scene.settings;
-  const CameraFrame camera = camera_frame(scene.view, s.width, s.height);
-  const Vec3d spacing = h.spacing(h.finest_level());
-  const double unit = smallest_edge(h);
-  const double to_units = camera.orthographic ? 1 / unit : 1;
-  const auto to_finest = [&](const Vec3d& p) { return (p - h.domain_lower()) / spacing; };
-  Vec3d lower{0};
-  Vec3d upper(h.cells(h.finest_level()));
-  if (scene.region) {
-    lower = glm::max(lower, to_finest((*scene.region)[0]));
-    upper = glm::max(lower, glm::min(upper, to_finest((*scene.region)[1])));
-  }
-  uniforms.push_back({"u_eye", numbers(to_finest(camera.eye)), true});
+  const FinestCamera camera = finest_camera(h, scene);
+  uniforms.push_back({"u_eye", numbers(camera.eye), true});
   uniforms.push_back({"u_forward", numbers(camera.forward), true});
-  uniforms.push_back({"u_right", numbers(camera.right * to_units), true});
-  uniforms.push_back({"u_up", numbers(camera.up * to_units), true});
+  uniforms.push_back({"u_right", numbers(camera.right), true});
+  uniforms.push_back({"u_up", numbers(camera.up), true});
   uniforms.push_back({"u_orthographic", std::vector<int>{camera.orthographic ? 1 : 0}});
-  uniforms.push_back({"u_cells_per_unit", numbers(Vec3d(unit) / spacing), true});
-  uniforms.push_back({"u_draw_lower", numbers(lower), true});
-  uniforms.push_back({"u_draw_upper", numbers(upper), true});
+  uniforms.push_back({"u_cells_per_unit", numbers(camera.cells_per_unit), true});
+  uniforms.push_back({"u_draw_lower", numbers(camera.lower), true});
+  uniforms.push_back({"u_draw_upper", numbers(camera.upper), true});
   uniforms.push_back({"u_picture_size", std::vector<double>{static_cast<double>(s.width), static_cast<double>(s.height)}});
 }
 
@@ -170,6 +160,27 @@ std::vector<double> value_scales(const EncodedField& field) {
 }
 
 }  // namespace
+
+FinestCamera finest_camera(const AmrHierarchy& h, const Scene& scene) {
+  const CameraFrame frame = camera_frame(scene.view, scene.settings.width, scene.settings.height);
+  const Vec3d spacing = h.spacing(h.finest_level());
+  const double unit = smallest_edge(h);
+  const double to_units = frame.orthographic ? 1 / unit : 1;
+  const auto to_finest = [&](const Vec3d& p) { return (p - h.domain_lower()) / spacing; };
+  FinestCamera camera;
+  camera.eye = to_finest(frame.eye);
+  camera.forward = frame.forward;
+  camera.right = frame.right * to_units;
+  camera.up = frame.up * to_units;
+  camera.cells_per_unit = Vec3d(unit) / spacing;
+  camera.upper = Vec3d(h.cells(h.finest_level()));
+  camera.orthographic = frame.orthographic;
+  if (scene.region) {
+    camera.lower = glm::max(camera.lower, to_finest((*scene.region)[0]));
+    camera.upper = glm::max(camera.lower, glm::min(camera.upper, to_finest((*scene.region)[1])));
+  }
+  return camera;
+}
 
 UniformValues field_uniforms(const AmrHierarchy& h, const EncodedField& field) {
   const Vec3i n = h.cells(h.finest_level());
@@ -239,6 +250,7 @@ SceneNeeds scene_needs(const Scene& scene, Filter filter, Filtering filtering) {
   needs.filtering = filter == Filter::nearest ? Filtering::manual : filtering;
   needs.value_ranges = scene.settings.skip;
   needs.gradients = scene.settings.draws_surfaces() && scene.settings.isosurfaces.shading == Shading::gradient;
+  needs.draw_boxes = scene.settings.consumer != ConsumerKind::raycast;
   return needs;
 }
 

@@ -303,22 +303,34 @@ int march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) f
   return i;
 }
 
-// The interval that is left after `whole` full ones.
-void march_lattice_rest(INOUT(Accumulation) a, IN(Ray) ray, IN(int) whole) {
+// The interval that is left after `whole` full ones, as a block of one sample, which lies at p.
+LatticeBlock lattice_rest(IN(Ray) ray, IN(int) whole, OUT(Position) p) {
   ray_real start = ray_real(u_step) * ray_real(whole);
   ray_real middle = (start + ray.length) * ray_real(0.5);
-  real length = real(ray.length - start);
   LatticeBlock block;
-  Position p = make_position(ray.entry + ray.direction * middle);
+  p = make_position(ray.entry + ray.direction * middle);
   block.cell = p.cell;
   block.fraction = p.fraction * AMRTEX_QUANTA;
   block.step = vec3r(0);
   block.first = whole;
+  return block;
+}
+
+void take_lattice_rest(INOUT(Accumulation) a, IN(Ray) ray, IN(LatticeBlock) block, IN(Region) r) {
+  ray_real start = ray_real(u_step) * ray_real(block.first);
+  ray_real middle = (start + ray.length) * ray_real(0.5);
+  real length = real(ray.length - start);
+  take_sample(a, r, lattice_q(block, lattice_frame(block, r), r, real(0)), length, start, middle);
+}
+
+void march_lattice_rest(INOUT(Accumulation) a, IN(Ray) ray, IN(int) whole) {
+  Position p;
+  LatticeBlock block = lattice_rest(ray, whole, p);
   Region r;
   bool inside = locate(p, r);
   bool skipped = !inside || region_invisible(a, r);
   count_region(a, skipped);
-  if (!skipped) take_sample(a, r, lattice_q(block, lattice_frame(block, r), r, real(0)), length, start, middle);
+  if (!skipped) take_lattice_rest(a, ray, block, r);
 }
 
 // Three nested loops (blocks, regions, samples): what is computed in an inner one is paid
@@ -460,7 +472,14 @@ vec4r missed_picture() {
   return vec4r(real(0), real(0), real(0), real(AMRTEX_MODE == AMRTEX_MODE_PROJECTION || AMRTEX_MODE == AMRTEX_MODE_MIP ? 1 : 0));
 }
 
-// The picture's value for one ray: premultiplied RGBA, or (value, 0, 0, 1).
+// The picture's value for what a ray has gathered, surfaces apart: premultiplied RGBA, or (value, 0, 0, 1).
+vec4r volume_picture(IN(Accumulation) a) {
+  if (AMRTEX_MODE == AMRTEX_MODE_DVR) return vec4r(a.color, real(1) - a.transmittance);
+  if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION) return vec4r(a.sum * u_length_unit, real(0), real(0), real(1));
+  return vec4r(a.maximum < real(-2.9e38) ? real(0) : a.maximum, real(0), real(0), real(1));
+}
+
+// The picture's value for one ray.
 vec4r march_ray(IN(Ray) ray, INOUT(Accumulation) a) {
   Front front;
   front.next = 0;
@@ -474,7 +493,5 @@ vec4r march_ray(IN(Ray) ray, INOUT(Accumulation) a) {
   }
 #endif
   march(ray, a, front);
-  if (AMRTEX_MODE == AMRTEX_MODE_DVR) return vec4r(a.color, real(1) - a.transmittance);
-  if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION) return vec4r(a.sum * u_length_unit, real(0), real(0), real(1));
-  return vec4r(a.maximum < real(-2.9e38) ? real(0) : a.maximum, real(0), real(0), real(1));
+  return volume_picture(a);
 }

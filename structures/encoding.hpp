@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "amr_hierarchy.hpp"
+#include "draw_tree.hpp"
 #include "host_texture.hpp"
 
 namespace amrtex {
@@ -63,6 +64,7 @@ struct SceneNeeds {
   Filtering filtering = Filtering::manual;
   bool value_ranges = true;  ///< regions are skipped by their value range
   bool gradients = false;    ///< surfaces are lit: stored gradients are of use where an encoding has room for them
+  bool draw_boxes = false;   ///< the consumer draws box by box: EncodedField::draw_tree, where the encoding can give one
   bool operator==(const SceneNeeds&) const = default;
 };
 
@@ -109,6 +111,7 @@ struct EncodedField {
   ShaderPart shader;
   std::vector<HostTexture> textures;
   std::vector<std::pair<std::string, Vec3i>> integer_uniforms;  ///< ivec3 uniforms of the encoding's GLSL
+  DrawTree draw_tree;  ///< empty where no consumer needs it, or where the encoding has no such boxes
   std::vector<LeftOut> left_out;
   Json statistics;                   ///< counts of the structure: pages, nodes, fill, ...
   std::int64_t host_peak_bytes = 0;  ///< arrays that the build itself allocated at once, the result included

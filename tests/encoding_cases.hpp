@@ -43,6 +43,7 @@ struct BuildOptions {
   int field = 0;
   std::vector<int> more_fields = {};
   ContextKind context = ContextKind::egl;  ///< whose handles a structure may use
+  bool draw_boxes = false;
 };
 
 /// Made once a process; never destroyed, since the drivers' libraries may be gone by then.
@@ -74,6 +75,7 @@ inline EncodedField build(const AmrHierarchy& h, const EncodingCase& c, const Bu
   request.needs.filter = c.filter;
   request.needs.filtering = options.filtering;
   request.needs.value_ranges = options.value_ranges;
+  request.needs.draw_boxes = options.draw_boxes;
   request.parameters = c.parameters;
   request.context = handle_limits(options.context);
   return c.encoding->build(h, request);

@@ -85,7 +85,7 @@ TEST(Experiment, OfOnePointHasTheDefaultsOfTheDocumentation) {
   EXPECT_EQ(e.datasets[0].generate["levels"], 2);
   EXPECT_EQ(e.renders[0].frames, 9);
   EXPECT_EQ(e.renders[0].warm_up, 2);
-  EXPECT_EQ(e.renders[0].consumer, "raycast");
+  EXPECT_EQ(e.renders[0].settings.consumer, ConsumerKind::raycast);
   EXPECT_EQ(e.renders[0].settings.width, 512);
   EXPECT_TRUE(e.renders[0].settings.skip);
   EXPECT_FALSE(e.renders[0].settings.early_end);
@@ -150,6 +150,18 @@ TEST(Experiment, RenderAxesViewsAndTransferFunctionsMultiply) {
   EXPECT_EQ(e.renders[6].transfer_function.extinction[1].extinction, 9);
   EXPECT_EQ(e.renders[2].settings.step, 0.25);
   EXPECT_EQ(e.renders[3].settings.sampling, Sampling::adaptive);
+}
+
+TEST(Experiment, ConsumersAreAnAxisAndOnlySlicesHaveATarget) {
+  const Experiment e = parsed(with("render", R"({"mode": "projection",
+      "consumer": ["raycast", "multipass", "slices", "stencil_slices"], "slice_target": ["rgba32f", "rgba8"]})"));
+  std::vector<std::string> points;
+  for (const RenderPoint& r : e.renders) {
+    const Json json = render_json(r);
+    points.push_back(json["consumer"].get<std::string>() + " " + json.value("slice_target", "-"));
+  }
+  EXPECT_THAT(points, ElementsAre("raycast -", "multipass -", "slices rgba32f", "slices rgba8", "stencil_slices rgba32f",
+                                  "stencil_slices rgba8"));
 }
 
 TEST(Experiment, ValuesThatAreListsBecomeAxesAsListsOfLists) {
@@ -341,7 +353,8 @@ TEST(ExperimentErrors, NameKeyAndWhatIsAccepted) {
       {"render", R"({"height": 18446744073709551615})", "render.height:", "an integer"},
       {"render", R"({"skip": 1})", "render.skip:", "true or false"},
       {"render", R"({"early_end": 2})", "render.early_end:", "from 0 to 1"},
-      {"render", R"({"consumer": "slices"})", "render.consumer:", "raycast"},
+      {"render", R"({"consumer": "splats"})", "render.consumer:", "raycast, multipass, slices, stencil_slices"},
+      {"render", R"({"consumer": "slices", "slice_target": "rgba16f"})", "render.slice_target:", "rgba32f, rgba8"},
       {"render", R"({"integrator": "euler"})", "render.integrator:", "exponential_midpoint"},
       {"render", R"({"tolerance": 1})", "render.tolerance: not available in this version", "mode, sampling"},
       {"render", R"({"prune": true})", "render.prune: not available in this version", "early_end"},

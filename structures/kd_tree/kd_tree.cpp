@@ -9,6 +9,7 @@
 #include <map>
 
 #include "brick_packing.hpp"
+#include "kd_draw_tree.hpp"
 #include "kd_partition.hpp"
 #include "start_grid.hpp"
 #include "structures/build_tools.hpp"
@@ -510,7 +511,9 @@ EncodedField KdTree::build(const AmrHierarchy& h, const BuildRequest& request) c
   }
   for (HostTexture& texture : stores.values) field.textures.push_back(std::move(texture));
   if (!stores.validity.data.empty()) field.textures.push_back(std::move(stores.validity));
-  field.host_peak_bytes = field.memory().total() + static_cast<std::int64_t>(p.tree.nodes.size() * (sizeof(Node) + sizeof(Box)));
+  if (request.needs.draw_boxes) field.draw_tree = make_draw_tree(h, p.tree);
+  field.host_peak_bytes = field.memory().total() + static_cast<std::int64_t>(p.tree.nodes.size() * (sizeof(Node) + sizeof(Box))) +
+                          field.draw_tree.bytes();
   return field;
 }
 

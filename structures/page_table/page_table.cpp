@@ -97,6 +97,47 @@ std::vector<Page> partition(const AmrHierarchy& h, int page_size) {
   return pages;
 }
 
+/// The pages' boxes under planes that cut none of them: whole ranges of pages are halved, then a divided page into its own.
+class PageDrawTree {
+ public:
+  PageDrawTree(const AmrHierarchy& h, int page_size, const std::vector<Page>& pages) : hierarchy_(h), page_size_(page_size) {
+    for (const Page& p : pages) pages_[key(p.level, p.index_in_level)] = p.kind;
+    tree_.nodes.emplace_back();
+    grow(0, 0, {Vec3i(0), ceil_div(h.cells(0), page_size)});
+  }
+  DrawTree tree() && { return std::move(tree_); }
+
+ private:
+  static std::array<int, 4> key(int level, const Vec3i& index) { return {level, index.x, index.y, index.z}; }
+
+  void grow(std::size_t node, int level, const Box& range) {
+    const Vec3i n = range.size();
+    const int axis = n.x >= n.y && n.x >= n.z ? 0 : n.y >= n.z ? 1 : 2;
+    if (n[axis] == 1) return add(node, level, range.lower);
+    std::array<Box, 2> halves{range, range};
+    const int middle = range.lower[axis] + n[axis] / 2;
+    halves[0].upper[axis] = halves[1].lower[axis] = middle;
+    const std::size_t child = tree_.split(node, axis, middle * page_size_ * hierarchy_.cell_width(level));
+    for (const std::size_t side : {0, 1}) grow(child + side, level, halves[side]);
+  }
+
+  void add(std::size_t node, int level, const Vec3i& index) {
+    const auto page = pages_.find(key(level, index));
+    if (page == pages_.end()) {  // divided
+      const Box inside{Vec3i(0), ceil_div(hierarchy_.cells(level + 1), page_size_)};
+      return grow(node, level + 1, intersection(Box{index, index + Vec3i(1)}.refined(hierarchy_.ratio_to_finer(level)), inside));
+    }
+    if (page->second == AMRTEX_PAGE_ABSENT) return;
+    const Box cells = intersection(Box{index, index + Vec3i(1)}.refined(page_size_), hierarchy_.domain(level));
+    tree_.set_box(node, cells.refined(hierarchy_.cell_width(level)), level);
+  }
+
+  const AmrHierarchy& hierarchy_;
+  int page_size_;
+  std::map<std::array<int, 4>, int> pages_;  ///< level and index: kind
+  DrawTree tree_;
+};
+
 /// The table: entries of the finest pages' size, in one level or two.
 struct TablePlan {
   int finest_level = 0;  ///< of any page
@@ -590,7 +631,9 @@ EncodedField PageTable::build(const AmrHierarchy& h, const BuildRequest& request
   field.textures = make_table(h, table, pages);
   for (HostTexture& pool : stores.pools) field.textures.push_back(std::move(pool));
   if (validity) field.textures.push_back(std::move(stores.validity));
-  field.host_peak_bytes = field.memory().total() + static_cast<std::int64_t>(pages.size() * sizeof(Page));
+  if (request.needs.draw_boxes) field.draw_tree = PageDrawTree(h, o.page_size, pages).tree();
+  field.host_peak_bytes =
+      field.memory().total() + static_cast<std::int64_t>(pages.size() * sizeof(Page)) + field.draw_tree.bytes();
   return field;
 }
 

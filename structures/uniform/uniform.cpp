@@ -47,6 +47,7 @@ class Uniform final : public Encoding {
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
+  EncodedField build_blocks(const AmrHierarchy& hierarchy, const BuildRequest& request) const;
   int level(const Json& parameters, int finest) const;
   Plan plan(const AmrHierarchy& hierarchy, const BuildRequest& request, const Json& parameters) const;
 };
@@ -194,6 +195,17 @@ Storages make_storages(const Plan& p, const EncodedField& field) {
 }
 
 EncodedField Uniform::build(const AmrHierarchy& h, const BuildRequest& request) const {
+  if (!request.needs.draw_boxes) return build_blocks(h, request);
+  // the texture is one box; value ranges would divide it in regions
+  BuildRequest whole = request;
+  whole.needs.value_ranges = false;
+  EncodedField field = build_blocks(h, whole);
+  field.draw_tree.nodes.emplace_back();
+  field.draw_tree.set_box(0, h.domain(h.finest_level()), field.build_parameters.at("level"));
+  return field;
+}
+
+EncodedField Uniform::build_blocks(const AmrHierarchy& h, const BuildRequest& request) const {
   require_filter(*this, request.needs.filter);
   require_fields(*this, h, request);
   const Json parameters = complete_parameters(*this, request.parameters);
@@ -224,7 +236,9 @@ EncodedField Uniform::build(const AmrHierarchy& h, const BuildRequest& request) 
   if (p.ranges)
     field.textures.push_back(std::move(out.ranges));
   else
-    field.left_out.push_back({"value ranges", "no region is skipped", 4 * p.block_count()});
+    field.left_out.push_back({"value ranges",
+                              request.needs.draw_boxes ? "the domain is drawn as one box" : "no region is skipped",
+                              4 * p.block_count()});
   field.statistics = {{"blocks", p.block_count()}};
   return field;
 }
