@@ -23,9 +23,10 @@ constexpr int kMaxPictureEdge = 16384;
 constexpr int kMaxFrames = 1000000;
 constexpr double kAnyNumber = std::numeric_limits<double>::max();
 
-constexpr std::array<std::string_view, 17> kAvailableRenderKeys = {
-    "mode",      "sampling",    "step",          "width",         "height",  "skip",   "early_end",   "consumer",    "integrator",
-    "isovalues", "iso_opacity", "surface_color", "iso_tolerance", "shading", "output", "color_field", "slice_target"};
+constexpr auto kAvailableRenderKeys = std::to_array<std::string_view>(
+    {"mode",     "sampling",     "step",        "width",       "height",      "skip",          "early_end",
+     "consumer", "slice_target", "integrator",  "isovalues",   "iso_opacity", "surface_color", "iso_tolerance",
+     "shading",  "output",       "color_field", "point_light", "ambient",     "shadow_step"});
 constexpr std::array<std::string_view, 4> kLaterRenderKeys = {"tolerance", "prune", "level_of_detail", "clip_planes"};
 constexpr std::array<std::string_view, 1> kIntegrators = {"exponential_midpoint"};
 constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
@@ -33,7 +34,7 @@ constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osm
 /// How many lists deep one value of this key is; what lies deeper is an axis.
 int value_depth(std::string_view key) {
   if (key == "extinction" || key == "color" || key == "surface_color") return 2;
-  constexpr std::array<std::string_view, 10> lists = {"more_fields", "eye",         "at",   "up",    "isovalues",
+  constexpr std::array<std::string_view, 11> lists = {"point_light", "more_fields", "eye",  "at",    "up",         "isovalues",
                                                       "iso_opacity", "clip_planes", "root", "ratio", "skip_levels"};
   return std::find(lists.begin(), lists.end(), key) != lists.end() ? 1 : 0;
 }
@@ -361,7 +362,25 @@ class Parser {
       finish_surfaces(point.settings.isosurfaces, choice);
     else
       point.settings.isosurfaces = {};  // other modes have no use for it
+    set_light(point.settings, choice);
     return point;
+  }
+
+  /// Complaints name the key they are about.
+  static void set_light(RenderSettings& s, const Choice& choice) {
+    const JsonNode* position = find(choice, "point_light");
+    const bool lit = position != nullptr && !position->json().is_null();
+    for (const char* key : {"ambient", "shadow_step"})
+      if (const JsonNode* node = find(choice, key); node != nullptr && !lit)
+        node->fail("belongs to the key 'point_light', which accepts three numbers [x, y, z]");
+    if (!lit) return;
+    const std::vector<double> p = numbers(*position);
+    if (!position->json().is_array() || p.size() != 3) position->fail("accepted: three numbers [x, y, z]");
+    PointLight& light = s.point_light.emplace();
+    light.position = {p[0], p[1], p[2]};
+    if (const JsonNode* node = find(choice, "ambient")) light.ambient = node->number(0, 1);
+    if (const JsonNode* node = find(choice, "shadow_step")) light.shadow_step = node->positive_number();
+    located(*position, [&] { validate_light(s); });
   }
 
   /// One opacity stands for all isovalues; complaints name the key they are about.
@@ -601,6 +620,11 @@ Json surfaces_json(const Isosurfaces& iso) {
   return json;
 }
 
+Json light_json(const PointLight& light) {
+  const Vec3d& p = light.position;
+  return {{"point_light", {p.x, p.y, p.z}}, {"ambient", light.ambient}, {"shadow_step", light.shadow_step}};
+}
+
 Json render_json(const RenderPoint& render) {
   const RenderSettings& s = render.settings;
   Json json = {{"consumer", consumer_name(s.consumer)},
@@ -618,6 +642,7 @@ Json render_json(const RenderPoint& render) {
                {"transfer_function_name", nullptr}};
   if (s.draws_slices()) json["slice_target"] = slice_target_name(s.slice_target);
   if (s.draws_surfaces()) json.update(surfaces_json(s.isosurfaces));
+  if (s.point_light) json.update(light_json(*s.point_light));
   if (!render.transfer_function_name.empty()) {
     json["transfer_function"] = to_json(render.transfer_function);
     json["transfer_function_name"] = render.transfer_function_name;

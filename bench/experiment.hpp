@@ -90,6 +90,9 @@ Scene scene_of(const Experiment& experiment, const RenderPoint& render);
 /// What a record and the name of a reference hold of isosurfaces.
 Json surfaces_json(const Isosurfaces& isosurfaces);
 
+/// What a record holds of a lamp.
+Json light_json(const PointLight& light);
+
 /// The `render` part of a record, names of view and transfer function included.
 Json render_json(const RenderPoint& render);
 

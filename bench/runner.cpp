@@ -407,6 +407,10 @@ Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definit
   }
   if (scene.settings.draws_volume() || scene.settings.draws_surfaces())
     key["transfer_function"] = to_json(scene.transfer_function);
+  if (scene.settings.point_light) {
+    key["light"] = light_json(*scene.settings.point_light);
+    key["light"].erase("shadow_step");  // sampling
+  }
   if (scene.region)
     for (const Vec3d& corner : *scene.region) key["region"].push_back({corner.x, corner.y, corner.z});
   key["step"] = step;

@@ -11,6 +11,7 @@
 #include <mutex>
 
 #include "renderers/reference_field.hpp"
+#include "renderers/reference_light.hpp"
 #include "renderers/reference_point.hpp"
 #include "renderers/reference_surface.hpp"
 #include "renderers/reference_tracer.hpp"
@@ -74,10 +75,11 @@ std::optional<Span> stretch_in(const IndexRay& ray, const Vec3d& lower, const Ve
   return span;
 }
 
-void draw_light(ReferenceTracer& tracer, const IndexRay& ray, double end, const Drawing& drawing, double* pixel) {
-  LightIntegral light(*drawing.table);
+void draw_light(ReferenceTracer& tracer, const IndexRay& ray, double end, const Drawing& drawing, LightIntegral::Arriving lamp,
+                double* pixel) {
+  LightIntegral light(*drawing.table, std::move(lamp));
   tracer.trace(ray, end, [&](const PieceFunction& f, double from, double to) {
-    light.add(f, to - from, drawing.part);
+    light.add(f, to - from, drawing.part, 0, 1, from);
     return light.transmittance() >= LightIntegral::kOpaque;
   });
   for (int c = 0; c < 3; ++c) pixel[c] = light.color()[c];
@@ -106,7 +108,14 @@ double line_maximum(ReferenceTracer& tracer, const IndexRay& ray, double end) {
 struct Worker {
   ReferenceTracer tracer;
   std::optional<SurfacePainter> painter;  // where there are surfaces
+  std::optional<LampTracer> lamp;         // where there is one
 };
+
+/// Light of the lamp along a ray; empty where there is no lamp.
+LightIntegral::Arriving arriving_light(Worker& worker, const IndexRay& ray) {
+  if (!worker.lamp) return {};
+  return [&lamp = *worker.lamp, &ray](double t) { return lamp.light_at(ray.origin + t * ray.direction); };
+}
 
 void draw_pixel(Worker& worker, const Drawing& drawing, int x, int y, Picture& picture) {
   const WorldRay world = camera_ray(drawing.camera, x, y, picture.width, picture.height);
@@ -118,7 +127,7 @@ void draw_pixel(Worker& worker, const Drawing& drawing, int x, int y, Picture& p
   double* pixel = picture.pixel(x, y);
   switch (drawing.mode) {
     case Mode::dvr:
-      draw_light(worker.tracer, ray, end, drawing, pixel);
+      draw_light(worker.tracer, ray, end, drawing, arriving_light(worker, ray), pixel);
       break;
     case Mode::projection:
       *pixel = line_integral(worker.tracer, ray, end, drawing.part);
@@ -128,7 +137,7 @@ void draw_pixel(Worker& worker, const Drawing& drawing, int x, int y, Picture& p
       break;
     case Mode::iso:
     case Mode::dvr_iso:
-      worker.painter->draw(worker.tracer, ray, world.direction, span->from, end, pixel);
+      worker.painter->draw(worker.tracer, ray, world.direction, span->from, end, arriving_light(worker, ray), pixel);
       break;
   }
 }
@@ -139,6 +148,7 @@ void check(const Scene& scene, double step) {
     throw Error(fmt::format("picture of {} x {} pixels: both must be at least 1", scene.settings.width, scene.settings.height));
   if (scene.settings.draws_volume()) validate(scene.transfer_function);
   if (scene.settings.draws_surfaces()) validate(scene.settings.isosurfaces);
+  validate_light(scene.settings);
 }
 
 double extinction_scale(const AmrHierarchy& h, const TransferFunction& tf) {
@@ -194,11 +204,15 @@ Picture HierarchyReference::render(const Scene& scene, double step) const {
   const Drawing drawing = make_drawing(h, scene, step, table ? &*table : nullptr);
   std::optional<SurfaceScene> surfaces;
   if (scene.settings.draws_surfaces()) surfaces.emplace(scene, data_->field, color_field, drawing.table, drawing.part);
+  std::optional<LampScene> lamp;
+  if (scene.settings.point_light)
+    lamp.emplace(scene, data_->field, extinction_scale(h, scene.transfer_function), drawing.lower, drawing.upper, drawing.part);
   Picture picture(scene.settings.width, scene.settings.height, scene.settings.picture_channels());
   const int columns = ceil_div(picture.width, kTile);
   tbb::enumerable_thread_specific<Worker> workers([&] {
-    Worker worker{ReferenceTracer(data_->field), std::nullopt};
+    Worker worker{ReferenceTracer(data_->field), std::nullopt, std::nullopt};
     if (surfaces) worker.painter.emplace(*surfaces);
+    if (lamp) worker.lamp.emplace(*lamp);
     return worker;
   });
   tbb::parallel_for(0, columns * ceil_div(picture.height, kTile), [&](int tile) {

@@ -274,6 +274,23 @@ void validate(const Isosurfaces& iso) {
     throw UsageError(fmt::format("isosurfaces: 'iso_tolerance' is {}; it must lie in (0, 1] cell widths", iso.tolerance));
 }
 
+void validate_light(const RenderSettings& s) {
+  if (!s.point_light) return;
+  const PointLight& light = *s.point_light;
+  if (!finite(light.position))
+    throw UsageError(fmt::format("'point_light' is ({}, {}, {}); it must be three finite numbers [x, y, z]", light.position.x,
+                                 light.position.y, light.position.z));
+  if (!(light.ambient >= 0 && light.ambient <= 1))
+    throw UsageError(fmt::format("'ambient' is {}; it must lie in [0, 1]", light.ambient));
+  if (!(light.shadow_step > 0 && std::isfinite(light.shadow_step)))
+    throw UsageError(fmt::format("'shadow_step' is {}; it must be above 0, in cell widths", light.shadow_step));
+  if (s.draws_volume()) return;
+  const bool measures = s.mode == Mode::dvr_iso;
+  throw UsageError(fmt::format("'point_light' lights a volume: the modes dvr and dvr_iso (output color) accept it, not {}{}",
+                               mode_name(s.mode),
+                               measures ? fmt::format(" with output {}", output_name(s.isosurfaces.output)) : ""));
+}
+
 TransferFunction surface_colors(const Scene& scene) {
   TransferFunction map = scene.transfer_function;
   if (!scene.settings.isosurfaces.color.empty()) {

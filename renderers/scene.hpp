@@ -113,6 +113,14 @@ struct Isosurfaces {
 /// Throws UsageError (no isovalue, too many, not ascending, opacities that do not fit, ...).
 void validate(const Isosurfaces& isosurfaces);
 
+/// A lamp in a volume (modes `dvr` and `dvr_iso`). What a place sends on is multiplied by
+/// ambient + (1 - ambient) exp(-optical depth of the drawn volume between the place and the lamp).
+struct PointLight {
+  Vec3d position{0};       ///< world; inside of the domain or not
+  double ambient = 0.1;    ///< light where the lamp does not reach, in [0, 1]
+  double shadow_step = 1;  ///< of the secondary ray: cell widths of each region (smallest edge)
+};
+
 struct RenderSettings {
   ConsumerKind consumer = ConsumerKind::raycast;
   SliceTarget slice_target = SliceTarget::rgba32f;  ///< consumers `slices` and `stencil_slices`
@@ -124,6 +132,7 @@ struct RenderSettings {
   bool skip = true;                 ///< regions that the transfer function makes invisible are skipped
   std::optional<double> early_end;  ///< opacity at which a ray ends; off when absent
   Isosurfaces isosurfaces;
+  std::optional<PointLight> point_light;  ///< absent: light of all places alike
 
   bool draws_volume() const { return mode == Mode::dvr || (mode == Mode::dvr_iso && isosurfaces.output == Output::color); }
   bool draws_slices() const { return consumer == ConsumerKind::slices || consumer == ConsumerKind::stencil_slices; }
@@ -131,6 +140,9 @@ struct RenderSettings {
   /// Premultiplied colour (4 channels), or one raw number.
   int picture_channels() const;
 };
+
+/// Throws UsageError: a lamp whose numbers are none, or in a picture without a volume. Nothing where there is no lamp.
+void validate_light(const RenderSettings& settings);
 
 struct Scene {
   View view;

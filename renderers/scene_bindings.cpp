@@ -146,6 +146,24 @@ void add_surfaces(const Scene& scene, const EncodedField& field, SceneBindings& 
   b.defines.emplace_back("AMRTEX_SHADING", iso.shading == Shading::gradient ? 1 : 0);
 }
 
+/// Beyond this distance, in diagonals of the domain, a lamp is moved nearer along its own direction: what changes
+/// is below the rounding of a float, in which positions of lamps further off may not fit.
+constexpr double kFarLamp = 1e7;
+
+void add_light(const AmrHierarchy& h, const RenderSettings& s, SceneBindings& b) {
+  validate_light(s);
+  b.defines.emplace_back("AMRTEX_SHADOWS", s.point_light ? 1 : 0);
+  if (!s.point_light) return;
+  const Vec3d middle = (h.domain_lower() + h.domain_upper()) * 0.5;
+  const double far = kFarLamp * glm::length(h.domain_upper() - h.domain_lower());
+  Vec3d way = s.point_light->position - middle;
+  if (const double most = std::max({std::abs(way.x), std::abs(way.y), std::abs(way.z)}); most > far) way *= far / most;
+  const Vec3d lamp = (middle - h.domain_lower() + way) / h.spacing(h.finest_level());
+  b.uniforms.push_back({"u_lamp", numbers(lamp), true});
+  b.uniforms.push_back({"u_lamp_ambient", std::vector<double>{s.point_light->ambient}});
+  b.uniforms.push_back({"u_shadow_step", std::vector<double>{s.point_light->shadow_step}});
+}
+
 /// What the shader draws: pictures of depth and normals have no volume.
 Mode shader_mode(const RenderSettings& s) { return s.mode == Mode::dvr_iso && !s.draws_volume() ? Mode::iso : s.mode; }
 
@@ -240,6 +258,7 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
                {"AMRTEX_SKIP", s.skip ? 1 : 0},
                {"AMRTEX_EARLY_END", s.early_end && s.draws_volume() ? 1 : 0},
                {"AMRTEX_ISOVALUES", s.draws_surfaces() ? static_cast<int>(s.isosurfaces.values.size()) : 0}};
+  add_light(h, s, b);
   if (s.draws_surfaces()) add_surfaces(scene, field, b);
   return b;
 }

@@ -51,12 +51,20 @@ void take_sample(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q, IN(real) leng
   }
 #endif
   if (missing) return;
+#if AMRTEX_CPP || AMRTEX_SHADOWS
+  if (AMRTEX_SHADOWS != 0) {
+    accumulate_lit(a, value, length, place_of(r, q));
+    return;
+  }
+#endif
   accumulate(a, value, length);
 }
 
 // Many intervals of one length in a region of one value: what take_sample does with each, in
-// the same order, so that the bits are the same; but one fetch and one transfer for all.
+// the same order, so that the bits are the same; but one fetch and one transfer for all. In the light of a lamp
+// each sample is its own: AMRTEX_CONSTANT_REGIONS is false.
 // `begin` and `way`: where the first interval begins, and from each to the next.
+#define AMRTEX_CONSTANT_REGIONS (AMRTEX_CELL_REGIONS && AMRTEX_FILTER == AMRTEX_FILTER_NEAREST && AMRTEX_SHADOWS == 0)
 void take_constant_samples(INOUT(Accumulation) a, IN(Region) r, IN(real) count, IN(real) length, IN(ray_real) begin, IN(ray_real) way) {
   real value = fetch_field(r, vec3r(0.5));
   if (AMRTEX_COUNT != 0) a.counted.x += int(count);
@@ -82,14 +90,20 @@ void take_constant_samples(INOUT(Accumulation) a, IN(Region) r, IN(real) count, 
   }
 }
 
-void take_stencil_sample(INOUT(Accumulation) a, IN(Stencil) s, IN(ivec3) octant, IN(vec3r) q, IN(real) length, IN(ray_real) begin,
-                         IN(ray_real) at) {
+void take_stencil_sample(INOUT(Accumulation) a, IN(Region) r, IN(Stencil) s, IN(ivec3) octant, IN(vec3r) q, IN(real) length,
+                         IN(ray_real) begin, IN(ray_real) at) {
   if (AMRTEX_COUNT != 0) a.counted.x += 1;
   real value = stencil_value(s, 0, octant, q);
 #if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
   if (AMRTEX_ISOVALUES != 0) {
     note_side(a, false, value, begin, at);
     if (a.crossing) return;
+  }
+#endif
+#if AMRTEX_CPP || AMRTEX_SHADOWS
+  if (AMRTEX_SHADOWS != 0) {
+    accumulate_lit(a, value, length, place_of(r, q));
+    return;
   }
 #endif
   accumulate(a, value, length);
@@ -228,7 +242,7 @@ ray_real lattice_place(IN(LatticeBlock) block, IN(real) i) { return ray_real(u_s
 
 // Returns the sample that lies across a surface, or `next`.
 int march_lattice_region(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(Region) r, IN(int) first, IN(int) next) {
-  if (AMRTEX_CELL_REGIONS && AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) {
+  if (AMRTEX_CONSTANT_REGIONS) {
     take_constant_samples(a, r, real(next - first), u_step, lattice_place(block, real(first)), ray_real(u_step));
     return AMRTEX_ISOVALUES != 0 && a.crossing ? first : next;
   }
@@ -262,7 +276,7 @@ int march_lattice_stencil(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(Regi
   fetch_stencil(r, octant, s);
   bool holds = true;
   do {
-    take_stencil_sample(a, s, octant, q, u_step, lattice_place(block, i), lattice_place(block, i + real(0.5)));
+    take_stencil_sample(a, r, s, octant, q, u_step, lattice_place(block, i), lattice_place(block, i + real(0.5)));
     i += real(1);
     q = lattice_q(block, frame, r, i);
     holds = stencil_holds(s, octant, q);
@@ -378,7 +392,7 @@ real march_adaptive_cell(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(v
       fetch_stencil(r, octant, s);
       bool same = true;
       do {
-        take_stencil_sample(a, s, octant, q, interval, begin + ray_real(interval * (i - real(0.5))), begin + ray_real(interval * i));
+        take_stencil_sample(a, r, s, octant, q, interval, begin + ray_real(interval * (i - real(0.5))), begin + ray_real(interval * i));
         i += real(1);
         q = q0 + dq * i;
         same = all(equal(stencil_octant(q), octant));
@@ -394,14 +408,14 @@ real march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(
   real inverse_width = real(1) / real(r.width);
   real count = max(ceil(length * inverse_width / u_step - real(1e-4)), real(1));
   real interval = length / count;
-  if (AMRTEX_CELL_REGIONS && AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) {
+  if (AMRTEX_CONSTANT_REGIONS) {
     ray_real first = begin + ray_real(interval * (from - real(0.5)));
     take_constant_samples(a, r, count - (from - real(0.5)), interval, first, ray_real(interval));
     return from;
   }
   vec3r q0 = f * inverse_width;
   vec3r dq = direction * (interval * inverse_width);
-  if (AMRTEX_CELL_REGIONS) return march_adaptive_cell(a, r, q0, dq, count, interval, begin, from);
+  if (AMRTEX_CELL_REGIONS && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST) return march_adaptive_cell(a, r, q0, dq, count, interval, begin, from);
   real i = from;
   if (i < count) {
     do {

@@ -329,6 +329,87 @@ TEST(Conformance, RegionsHoldTheirPositionsAndTheirValues) {
   });
 }
 
+// ---- continuity ----
+
+/// Places on faces, edges and corners of leaves of every level, each from all of the 2, 4 or 8 sides.
+std::vector<std::vector<FinestPosition>> places_from_all_sides(const AmrHierarchy& h) {
+  std::mt19937_64 random(7);
+  const Box domain = h.domain(h.finest_level());
+  std::vector<std::vector<FinestPosition>> places;
+  for (const LeafCell& leaf : some_leaves(h, 40, random)) {
+    const int w = h.cell_width(leaf.level);
+    for (int on = 1; on < 8; ++on) {  // the axes along which the place lies on a face of the leaf
+      FinestPosition p{leaf.cell * w, Vec3d(0)};
+      for (int a = 0; a < 3; ++a) {
+        const bool on_face = ((on >> a) & 1) != 0;
+        p.cell[a] += on_face ? w * static_cast<int>(random() % 2) : static_cast<int>(random() % static_cast<unsigned>(w));
+        if (!on_face) p.fraction[a] = static_cast<double>(random() % 1024) / 1024;
+      }
+      std::vector<FinestPosition>& sides = places.emplace_back();
+      for (int below = 0; below < 8; ++below) {
+        if ((below & ~on) != 0) continue;
+        FinestPosition side = p;
+        for (int a = 0; a < 3; ++a)
+          if (((below >> a) & 1) != 0) {
+            side.cell[a] -= 1;
+            side.fraction[a] = kBelowOne;
+          }
+        if (domain.contains(side.cell)) sides.push_back(side);
+      }
+    }
+  }
+  return places;
+}
+
+/// Largest difference between the sides of a place.
+double largest_jump(const std::vector<std::vector<FinestPosition>>& places, std::span<const ProbeResult> values) {
+  double jump = 0;
+  std::size_t i = 0;
+  for (const auto& sides : places) {
+    double low = kInf;
+    double high = -kInf;
+    for (std::size_t k = 0; k < sides.size(); ++k, ++i)
+      if (values[i].found) {
+        low = std::min(low, values[i].value);
+        high = std::max(high, values[i].value);
+      }
+    jump = std::max(jump, high - low);
+  }
+  return jump;
+}
+
+TEST(Conformance, VerticesMakeAFieldWithoutJumpsAcrossFacesEdgesAndCornersOfAnyLevels) {
+  // the bound is 1e-6 of the range, in floats and double; linear_lod is the control that jumps
+  std::vector<NamedMesh> jumping;
+  jumping.push_back({"ratio 2", nested(waves).hierarchy()});
+  jumping.push_back({"ratios 4 and 2", nested(waves, {4, 2}).hierarchy()});
+  jumping.push_back({"ratios 2 and 4", nested(waves, {2, 4}).hierarchy()});
+  jumping.push_back({"jump of two levels", jump_of_two(waves).hierarchy()});
+  jumping.push_back({"holes and missing values", holes_and_missing(waves).hierarchy()});
+  Context& gl = context(ContextKind::egl);
+  int continuous = 0;
+  for (const auto& [name, h] : jumping) {
+    const auto places = places_from_all_sides(h);
+    std::vector<FinestPosition> positions;
+    for (const auto& sides : places) positions.insert(positions.end(), sides.begin(), sides.end());
+    for (const EncodingCase& c : encoding_cases()) {
+      if (c.filter != Filter::linear_vertex && c.filter != Filter::linear_lod) continue;
+      SCOPED_TRACE(name + ": " + c.name());
+      const EncodedField floats = build(h, c);
+      const double on_gl = largest_jump(places, probe_on_gl(gl, h, floats, GpuField(floats, gl), positions)) / value_range(h);
+      if (c.filter == Filter::linear_lod) {
+        EXPECT_GT(on_gl, 1e-3);
+        continue;
+      }
+      EXPECT_LE(on_gl, 1e-6);
+      const EncodedField doubles = build(h, c, {.storage = Storage::r64f});
+      EXPECT_LE(largest_jump(places, probe_on_cpu(h, doubles, Precision::double_precision, positions)) / value_range(h), 1e-6);
+      ++continuous;
+    }
+  }
+  EXPECT_GT(continuous, 0);
+}
+
 // ---- no value: nothing spreads further than the filter's footprint ----
 
 TEST(Conformance, MissingValuesSpreadNoFurtherThanTheFootprint) {
