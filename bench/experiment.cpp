@@ -21,12 +21,14 @@ using Choice = std::vector<std::pair<std::string, JsonNode>>;
 
 constexpr int kMaxPictureEdge = 16384;
 constexpr int kMaxFrames = 1000000;
+constexpr int kMostLevel = 63;
 constexpr double kAnyNumber = std::numeric_limits<double>::max();
 
-constexpr std::array<std::string_view, 16> kAvailableRenderKeys = {
-    "mode",       "sampling",  "step",        "width",         "height",        "skip",    "early_end", "consumer",
-    "integrator", "isovalues", "iso_opacity", "surface_color", "iso_tolerance", "shading", "output",    "color_field"};
-constexpr std::array<std::string_view, 4> kLaterRenderKeys = {"tolerance", "prune", "level_of_detail", "clip_planes"};
+constexpr std::array<std::string_view, 18> kAvailableRenderKeys = {
+    "mode",          "sampling", "step",       "width",       "height",          "skip",
+    "early_end",     "consumer", "integrator", "isovalues",   "iso_opacity",     "surface_color",
+    "iso_tolerance", "shading",  "output",     "color_field", "level_of_detail", "max_level"};
+constexpr std::array<std::string_view, 3> kLaterRenderKeys = {"tolerance", "prune", "clip_planes"};
 constexpr std::array<std::string_view, 1> kConsumers = {"raycast"};
 constexpr std::array<std::string_view, 1> kIntegrators = {"exponential_midpoint"};
 constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
@@ -418,6 +420,8 @@ class Parser {
     if (key == "height") s.height = static_cast<int>(node.integer(1, kMaxPictureEdge));
     if (key == "skip") s.skip = node.boolean();
     if (key == "early_end" && !node.json().is_null()) s.early_end = node.number(0, 1);
+    if (key == "level_of_detail" && !node.json().is_null()) s.level_of_detail = node.positive_number();
+    if (key == "max_level" && !node.json().is_null()) s.max_level = static_cast<int>(node.integer(0, kMostLevel));
     if (key == "consumer") point.consumer = node.one_of(kConsumers);
     if (key == "integrator") point.integrator = node.one_of(kIntegrators);
   }
@@ -616,6 +620,9 @@ Json render_json(const RenderPoint& render) {
                {"transfer_function", nullptr},
                {"transfer_function_name", nullptr}};
   if (s.draws_surfaces()) json.update(surfaces_json(s.isosurfaces));
+  // only where they are in use, so that the names of other records stay
+  if (s.level_of_detail) json["level_of_detail"] = *s.level_of_detail;
+  if (s.max_level) json["max_level"] = *s.max_level;
   if (!render.transfer_function_name.empty()) {
     json["transfer_function"] = to_json(render.transfer_function);
     json["transfer_function_name"] = render.transfer_function_name;

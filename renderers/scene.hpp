@@ -114,7 +114,11 @@ struct RenderSettings {
   bool skip = true;                 ///< regions that the transfer function makes invisible are skipped
   std::optional<double> early_end;  ///< opacity at which a ray ends; off when absent
   Isosurfaces isosurfaces;
+  /// Refined cells are drawn themselves where they are smaller on the picture, pixels; off when absent.
+  std::optional<double> level_of_detail;
+  std::optional<int> max_level;  ///< nothing finer is drawn where a cell of this level or a coarser one lies; off when absent
 
+  bool prunes_levels() const { return level_of_detail || max_level; }
   bool draws_volume() const { return mode == Mode::dvr || (mode == Mode::dvr_iso && isosurfaces.output == Output::color); }
   bool draws_surfaces() const { return mode == Mode::iso || mode == Mode::dvr_iso; }
   /// Premultiplied colour (4 channels), or one raw number.

@@ -56,8 +56,9 @@ struct Support {
 struct SceneNeeds {
   Filter filter = Filter::nearest;
   Filtering filtering = Filtering::manual;
-  bool value_ranges = true;  ///< regions are skipped by their value range
-  bool gradients = false;    ///< surfaces are lit: stored gradients are of use where an encoding has room for them
+  bool value_ranges = true;      ///< regions are skipped by their value range
+  bool gradients = false;        ///< surfaces are lit: stored gradients are of use where an encoding has room for them
+  bool level_of_detail = false;  ///< refined cells may be drawn in place of what lies below them
   bool operator==(const SceneNeeds&) const = default;
 };
 
@@ -135,6 +136,8 @@ class Encoding {
   /// Throws UsageError for values that no mesh would make acceptable. `parameters` is complete.
   virtual void check_parameters(const Json& parameters) const = 0;
   virtual Support supported(const ContextInfo& context) const = 0;
+  /// Can refined cells be drawn in place of what lies below them (SceneNeeds::level_of_detail)? Else why not.
+  virtual Support level_of_detail() const { return {false, "it stores no values of refined cells"}; }
   /// Builds the field. Throws UsageError for a bad parameter, UnsupportedError for
   /// a filter or a size that this encoding cannot take (naming what it can), and
   /// BudgetError before allocation when the result would pass the limits.
@@ -150,6 +153,8 @@ const Encoding& find_encoding(std::string_view name);
 Json complete_parameters(const Encoding& encoding, const Json& given);
 /// Throws UnsupportedError naming the filters that the encoding has.
 void require_filter(const Encoding& encoding, Filter filter);
+/// Throws UnsupportedError with the reason and the encodings that have it when a level of detail is needed and not there.
+void require_level_of_detail(const Encoding& encoding, const SceneNeeds& needs);
 /// Throws UsageError that says how many fields are supported, or which index the mesh does not have.
 void require_fields(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request);
 /// Throws BudgetError with the bytes needed when `bytes` passes the limit.

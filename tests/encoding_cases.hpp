@@ -41,6 +41,7 @@ struct BuildOptions {
   bool value_ranges = true;
   int field = 0;
   std::vector<int> more_fields = {};
+  bool level_of_detail = false;
 };
 
 /// Throws UnsupportedError for a mesh or combination that the encoding refuses.
@@ -52,6 +53,7 @@ inline EncodedField build(const AmrHierarchy& h, const EncodingCase& c, const Bu
   request.needs.filter = c.filter;
   request.needs.filtering = options.filtering;
   request.needs.value_ranges = options.value_ranges;
+  request.needs.level_of_detail = options.level_of_detail;
   request.parameters = c.parameters;
   return c.encoding->build(h, request);
 }
