@@ -21,13 +21,14 @@ using Choice = std::vector<std::pair<std::string, JsonNode>>;
 
 constexpr int kMaxPictureEdge = 16384;
 constexpr int kMaxFrames = 1000000;
+constexpr int kMostLevel = 63;
 constexpr double kAnyNumber = std::numeric_limits<double>::max();
 
 constexpr auto kAvailableRenderKeys = std::to_array<std::string_view>(
-    {"mode",     "sampling",     "step",        "width",       "height",      "skip",          "early_end",
-     "consumer", "slice_target", "integrator",  "isovalues",   "iso_opacity", "surface_color", "iso_tolerance",
-     "shading",  "output",       "color_field", "point_light", "ambient",     "shadow_step"});
-constexpr std::array<std::string_view, 4> kLaterRenderKeys = {"tolerance", "prune", "level_of_detail", "clip_planes"};
+    {"mode",         "sampling",    "step",      "width",       "height",          "skip",          "early_end", "consumer",
+     "slice_target", "integrator",  "isovalues", "iso_opacity", "surface_color",   "iso_tolerance", "shading",   "output",
+     "color_field",  "point_light", "ambient",   "shadow_step", "level_of_detail", "max_level"});
+constexpr std::array<std::string_view, 3> kLaterRenderKeys = {"tolerance", "prune", "clip_planes"};
 constexpr std::array<std::string_view, 1> kIntegrators = {"exponential_midpoint"};
 constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
 
@@ -439,6 +440,8 @@ class Parser {
     if (key == "early_end" && !node.json().is_null()) s.early_end = node.number(0, 1);
     if (key == "consumer") s.consumer = located(node, [&] { return parse_consumer(node.text()); });
     if (key == "slice_target") s.slice_target = located(node, [&] { return parse_slice_target(node.text()); });
+    if (key == "level_of_detail" && !node.json().is_null()) s.level_of_detail = node.positive_number();
+    if (key == "max_level" && !node.json().is_null()) s.max_level = static_cast<int>(node.integer(0, kMostLevel));
     if (key == "integrator") point.integrator = node.one_of(kIntegrators);
   }
 
@@ -643,6 +646,9 @@ Json render_json(const RenderPoint& render) {
   if (s.draws_slices()) json["slice_target"] = slice_target_name(s.slice_target);
   if (s.draws_surfaces()) json.update(surfaces_json(s.isosurfaces));
   if (s.point_light) json.update(light_json(*s.point_light));
+  // only where they are in use, so that the names of other records stay
+  if (s.level_of_detail) json["level_of_detail"] = *s.level_of_detail;
+  if (s.max_level) json["max_level"] = *s.max_level;
   if (!render.transfer_function_name.empty()) {
     json["transfer_function"] = to_json(render.transfer_function);
     json["transfer_function_name"] = render.transfer_function_name;

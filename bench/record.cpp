@@ -205,6 +205,17 @@ void check_frame(const Json& frame) {
     fail("/frame/wall_ms/n", fmt::format("is not the number of samples, {}", all.size()));
 }
 
+/// Causes that were not measured are left out or null.
+void check_split(const Json& error) {
+  if (error.is_null() || error.at("split").is_null()) return;
+  for (const auto& [cause, difference] : error.at("split").items()) {
+    if (difference.is_null()) continue;
+    for (const char* key : {"rmse", "max"})
+      if (!difference.is_object() || !difference.contains(key) || !difference.at(key).is_number())
+        fail(fmt::format("/error/split/{}/{}", cause, key), "a number is expected");
+  }
+}
+
 /// Sorted keys, and whole floats as integers, so that equal configurations have equal texts.
 nlohmann::json canonical(const Json& json) {
   if (json.is_object()) {
@@ -344,6 +355,7 @@ void validate_record(const Json& record) {
   check_status(record);
   check_memory(record.at("memory"));
   check_frame(record.at("frame"));
+  check_split(record.at("error"));
 }
 
 std::string configuration_hash(const Json& configuration) {

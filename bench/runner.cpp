@@ -181,7 +181,10 @@ class Runner {
       warn(record, "slices were blended in 8 bits a channel (slice_target rgba8): a historical control");
     if (!consumer->transfer_exact())
       warn(record, "the transfer function has more than 16 points: it is drawn from a table of 4096 bins");
-    if (!add_errors(record, picture, built.field, scene)) {
+    const bool right = add_errors(record, picture, built.field, scene);
+    if (!record["error"].is_null() && scene.settings.prunes_levels())
+      record["error"]["split"]["level_of_detail"] = pruning_error(built, scene, picture);
+    if (!right) {
       write(build, render, record);
       return;  // a wrong picture gets no time
     }
@@ -222,6 +225,16 @@ class Runner {
       return false;
     }
     return true;
+  }
+
+  /// What the level of detail did: the picture against that of the same structure without it.
+  Json pruning_error(Built& built, Scene scene, const Picture& pruned) const {
+    scene.settings.level_of_detail.reset();
+    scene.settings.max_level.reset();
+    const auto whole = make_consumer(*context_, *mesh_, built.field, *built.gpu, scene);
+    whole->draw();
+    const ErrorMetrics error = compare(pruned, whole->read());
+    return {{"rmse", error.rmse}, {"max", error.max}};
   }
 
   void add_times(Json& record, const BuildPoint& build, const RenderPoint& render, Consumer& consumer) {

@@ -133,7 +133,11 @@ struct RenderSettings {
   std::optional<double> early_end;  ///< opacity at which a ray ends; off when absent
   Isosurfaces isosurfaces;
   std::optional<PointLight> point_light;  ///< absent: light of all places alike
+  /// Refined cells are drawn themselves where they are smaller on the picture, pixels; off when absent.
+  std::optional<double> level_of_detail;
+  std::optional<int> max_level;  ///< nothing finer is drawn where a cell of this level or a coarser one lies; off when absent
 
+  bool prunes_levels() const { return level_of_detail || max_level; }
   bool draws_volume() const { return mode == Mode::dvr || (mode == Mode::dvr_iso && isosurfaces.output == Output::color); }
   bool draws_slices() const { return consumer == ConsumerKind::slices || consumer == ConsumerKind::stencil_slices; }
   bool draws_surfaces() const { return mode == Mode::iso || mode == Mode::dvr_iso; }

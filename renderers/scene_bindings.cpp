@@ -110,6 +110,29 @@ void add_camera(const AmrHierarchy& h, const Scene& scene, UniformValues& unifor
   uniforms.push_back({"u_picture_size", std::vector<double>{static_cast<double>(s.width), static_cast<double>(s.height)}});
 }
 
+/// Of level_suffices() in contract.glsl. A cell w finest cells wide is smaller than the threshold where
+/// w * diagonal * pixels < threshold * distance; `pixels` are those of one world unit at distance 1, or at any one.
+void add_detail(const AmrHierarchy& h, const Scene& scene, UniformValues& uniforms) {
+  const RenderSettings& s = scene.settings;
+  const CameraFrame camera = camera_frame(scene.view, s.width, s.height);
+  const Vec3d spacing = h.spacing(h.finest_level());
+  const double unit = smallest_edge(h);
+  const double diagonal = unit * glm::length(spacing / unit);
+  const double pixels = s.height / 2.0 / glm::length(camera.up);
+  const double threshold = s.level_of_detail.value_or(0);
+  constexpr double kMost = 1e18;  // its square is a float
+  Vec3d scale(0);
+  double far = 0;
+  if (camera.orthographic)
+    far = std::min(threshold / (diagonal * pixels), kMost);
+  else
+    scale = glm::min(spacing / diagonal * (threshold / pixels), Vec3d(kMost));
+  uniforms.push_back({"u_detail_level", std::vector<int>{std::min(s.max_level.value_or(h.finest_level()), h.finest_level())}});
+  uniforms.push_back({"u_detail_eye", numbers((camera.eye - h.domain_lower()) / spacing)});
+  uniforms.push_back({"u_detail_scale", numbers(scale)});
+  uniforms.push_back({"u_detail_far", std::vector<double>{far * far}});
+}
+
 /// Bisections after which an interval between two samples is no longer than the tolerance.
 int bisections(const RenderSettings& s) {
   return std::clamp(static_cast<int>(std::ceil(std::log2(s.step / s.isosurfaces.tolerance))), 1, 32);
@@ -164,6 +187,13 @@ void add_light(const AmrHierarchy& h, const RenderSettings& s, SceneBindings& b)
   b.uniforms.push_back({"u_shadow_step", std::vector<double>{s.point_light->shadow_step}});
 }
 
+void require_detail(const EncodedField& field, const RenderSettings& s) {
+  const auto& defines = field.shader.defines;
+  const auto it = std::find(defines.begin(), defines.end(), std::pair<std::string, int>("AMRTEX_LEVEL_OF_DETAIL", 1));
+  if (s.prunes_levels() && it == defines.end())
+    throw Error(fmt::format("level of detail: the structure of encoding {} was built without it", field.encoding));
+}
+
 /// What the shader draws: pictures of depth and normals have no volume.
 Mode shader_mode(const RenderSettings& s) { return s.mode == Mode::dvr_iso && !s.draws_volume() ? Mode::iso : s.mode; }
 
@@ -209,6 +239,10 @@ UniformValues field_uniforms(const AmrHierarchy& h, const EncodedField& field) {
   uniforms.push_back({"u_level_width", widths});
   uniforms.push_back({"u_range_origin", std::vector<double>{field.range_origin}});
   uniforms.push_back({"u_value_scale", value_scales(field)});
+  // without a scene nothing is pruned
+  uniforms.push_back({"u_detail_level", std::vector<int>{h.finest_level()}});
+  for (const char* name : {"u_detail_eye", "u_detail_scale"}) uniforms.push_back({name, numbers(Vec3d(0))});
+  uniforms.push_back({"u_detail_far", std::vector<double>{0}});
   for (const auto& [name, v] : field.integer_uniforms) uniforms.push_back({name, std::vector<int>{v.x, v.y, v.z}});
   return uniforms;
 }
@@ -221,6 +255,8 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
   SceneBindings b;
   b.uniforms = field_uniforms(h, field);
   add_camera(h, scene, b.uniforms);
+  require_detail(field, s);
+  if (s.prunes_levels()) add_detail(h, scene, b.uniforms);
   b.uniforms.push_back({"u_step", std::vector<double>{s.step}});
   b.uniforms.push_back({"u_early_end", std::vector<double>{1 - s.early_end.value_or(1)}});
   b.uniforms.push_back({"u_length_unit", std::vector<double>{unit}});
@@ -268,6 +304,7 @@ SceneNeeds scene_needs(const Scene& scene, Filter filter, Filtering filtering) {
   needs.filter = filter;
   needs.filtering = filter == Filter::nearest ? Filtering::manual : filtering;
   needs.value_ranges = scene.settings.skip;
+  needs.level_of_detail = scene.settings.prunes_levels();
   needs.gradients = scene.settings.draws_surfaces() && scene.settings.isosurfaces.shading == Shading::gradient;
   needs.draw_boxes = scene.settings.consumer != ConsumerKind::raycast;
   return needs;

@@ -113,6 +113,7 @@ Filtering stored_filtering(const BuildRequest& request) {
 EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request,
                          const Json& parameters) {
   require_fields(encoding, hierarchy, request);
+  require_level_of_detail(encoding, request.needs);
   EncodedField field;
   field.encoding = encoding.name();
   field.build_parameters = parameters;
@@ -137,7 +138,8 @@ EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy
                           {"AMRTEX_FIELDS", field.field_count},
                           {"AMRTEX_VALIDITY", any_missing(hierarchy, request) ? 1 : 0},
                           {"AMRTEX_VALUE_RANGES", request.needs.value_ranges ? 1 : 0},
-                          {"AMRTEX_SCALED_STORAGE", scaled ? 1 : 0}};
+                          {"AMRTEX_SCALED_STORAGE", scaled ? 1 : 0},
+                          {"AMRTEX_LEVEL_OF_DETAIL", request.needs.level_of_detail ? 1 : 0}};
   return field;
 }
 

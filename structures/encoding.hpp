@@ -62,9 +62,10 @@ struct Support {
 struct SceneNeeds {
   Filter filter = Filter::nearest;
   Filtering filtering = Filtering::manual;
-  bool value_ranges = true;  ///< regions are skipped by their value range
-  bool gradients = false;    ///< surfaces are lit: stored gradients are of use where an encoding has room for them
-  bool draw_boxes = false;   ///< the consumer draws box by box: EncodedField::draw_tree, where the encoding can give one
+  bool value_ranges = true;      ///< regions are skipped by their value range
+  bool gradients = false;        ///< surfaces are lit: stored gradients are of use where an encoding has room for them
+  bool level_of_detail = false;  ///< refined cells may be drawn in place of what lies below them
+  bool draw_boxes = false;       ///< the consumer draws box by box: EncodedField::draw_tree, where the encoding can give one
   bool operator==(const SceneNeeds&) const = default;
 };
 
@@ -153,6 +154,8 @@ class Encoding {
   virtual Support supported(const ContextInfo& context) const = 0;
   /// Values of parameters that build() refuses for want of something in the context, for tables and messages.
   virtual std::vector<UnsupportedValue> unsupported_values(const ContextInfo& /*context*/) const { return {}; }
+  /// Can refined cells be drawn in place of what lies below them (SceneNeeds::level_of_detail)? Else why not.
+  virtual Support level_of_detail() const { return {false, "it stores no values of refined cells"}; }
   /// Builds the field. Throws UsageError for a bad parameter, UnsupportedError for
   /// a filter or a size that this encoding cannot take (naming what it can), and
   /// BudgetError before allocation when the result would pass the limits.
@@ -168,6 +171,8 @@ const Encoding& find_encoding(std::string_view name);
 Json complete_parameters(const Encoding& encoding, const Json& given);
 /// Throws UnsupportedError naming the filters that the encoding has.
 void require_filter(const Encoding& encoding, Filter filter);
+/// Throws UnsupportedError with the reason and the encodings that have it when a level of detail is needed and not there.
+void require_level_of_detail(const Encoding& encoding, const SceneNeeds& needs);
 /// Throws UsageError that says how many fields are supported, or which index the mesh does not have.
 void require_fields(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request);
 /// Throws BudgetError with the bytes needed when `bytes` passes the limit.

@@ -44,6 +44,7 @@ struct BuildOptions {
   std::vector<int> more_fields = {};
   ContextKind context = ContextKind::egl;  ///< whose handles a structure may use
   bool draw_boxes = false;
+  bool level_of_detail = false;
 };
 
 /// Made once a process; never destroyed, since the drivers' libraries may be gone by then.
@@ -76,6 +77,7 @@ inline EncodedField build(const AmrHierarchy& h, const EncodingCase& c, const Bu
   request.needs.filtering = options.filtering;
   request.needs.value_ranges = options.value_ranges;
   request.needs.draw_boxes = options.draw_boxes;
+  request.needs.level_of_detail = options.level_of_detail;
   request.parameters = c.parameters;
   request.context = handle_limits(options.context);
   return c.encoding->build(h, request);

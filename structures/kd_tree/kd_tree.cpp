@@ -9,6 +9,7 @@
 #include <map>
 
 #include "brick_packing.hpp"
+#include "kd_detail.hpp"
 #include "kd_draw_tree.hpp"
 #include "kd_partition.hpp"
 #include "start_grid.hpp"
@@ -38,11 +39,13 @@ struct Options {
   bool bindless = false;  ///< a texture a brick, no pool
   bool paper_packing = false;
   bool grid = true;
+  bool wrap = false;
+  bool detail = false;  ///< refined cells may be drawn
   bool vertices = false;
   int border = 0;  ///< texels before the first cell of a brick
 };
 
-/// What is stored of one subgrid: the box around its drawn leaves.
+/// What is stored of one subgrid: the box around its drawn blocks.
 struct Brick {
   int level;
   int patch;
@@ -62,12 +65,23 @@ struct Plan {
   std::int64_t validity_words = 0;
   std::int64_t brick_texels = 0;
   std::int64_t leaf_cells = 0;
+  std::int64_t detail_cells = 0;  ///< refined ones that are stored
+  std::int64_t leaf_count = 0;
+  std::int64_t leaf_bricks = 0;  ///< that hold a leaf
   std::int64_t node_count() const { return static_cast<std::int64_t>(tree.nodes.size()); }
   std::int64_t brick_count() const { return static_cast<std::int64_t>(bricks.size()); }
   /// Texels of one field.
   std::int64_t texels(const Options& o) const { return o.bindless ? brick_texels : packing.texels(); }
-  std::int64_t leaf_count() const { return static_cast<std::int64_t>(tree.leaves.size()); }
+  std::int64_t block_count() const { return static_cast<std::int64_t>(tree.leaves.size()); }
 };
+
+/// Adds a block's cells to those of leaves, or to the refined ones.
+void count_block(const Leaf& block, std::int64_t& leaf_cells, std::int64_t& refined_cells) {
+  if (block.next == kNothingFiner)
+    leaf_cells += block.cells.cells();
+  else if (!block.repeated)
+    refined_cells += block.cells.cells();
+}
 
 std::vector<Brick> make_bricks(const Tree& tree, std::vector<int>& brick_of) {
   std::map<std::pair<int, int>, int> known;  // level, patch
@@ -209,25 +223,28 @@ class KdTree final : public Encoding {
     return {
         {"storage_kind", "where bricks are stored: in one texture, or each in its own", "pool", "\"pool\" or \"bindless\""},
         {"packing", "how bricks are packed into the pool", "best_fit", "\"best_fit\" or \"nfdh\""},
-        {"traversal", "where the search for a leaf starts: at a grid's cell, or at the root", "grid", "\"grid\" or \"restart\""}};
+        {"traversal", "where the search for a leaf starts: at a grid's cell, or at the root", "grid", "\"grid\" or \"restart\""},
+        {"wrap", "is what lies outside of all subgrids of a node split off before it is divided among them?", true,
+         "true or false"}};
   }
-  void check_parameters(const Json& parameters) const override { options(parameters, Filter::nearest); }
+  void check_parameters(const Json& parameters) const override { options(parameters, {}); }
   Support supported(const ContextInfo&) const override { return {}; }
   std::vector<UnsupportedValue> unsupported_values(const ContextInfo& context) const override {
     const Support support = supports_handles(context);
     if (support.ok) return {};
     return {{"storage_kind", "bindless", support.reason}};
   }
+  Support level_of_detail() const override { return {}; }
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
-  Options options(const Json& parameters, Filter filter) const;
+  Options options(const Json& parameters, const SceneNeeds& needs) const;
   Plan plan(const AmrHierarchy& h, const BuildRequest& request, const Options& o) const;
   void plan_pool(const BuildRequest& request, const Options& o, Plan& p) const;
   void require_sizes(const BuildRequest& request, const Options& o, const Plan& p) const;
 };
 
-Options KdTree::options(const Json& parameters, Filter filter) const {
+Options KdTree::options(const Json& parameters, const SceneNeeds& needs) const {
   const auto second = [&](const char* name, const char* first_value, const char* second_value) {
     const Json& value = parameters.at(name);
     if (value != first_value && value != second_value)
@@ -239,8 +256,13 @@ Options KdTree::options(const Json& parameters, Filter filter) const {
   o.bindless = second("storage_kind", "pool", "bindless");
   o.paper_packing = second("packing", "best_fit", "nfdh");
   o.grid = !second("traversal", "grid", "restart");
-  o.vertices = filter == Filter::linear_vertex;
-  o.border = filter == Filter::linear_lod ? 1 : 0;
+  if (!parameters.at("wrap").is_boolean())
+    throw UsageError(
+        fmt::format("encoding kd_tree: parameter wrap is {}; accepted: true or false", parameters.at("wrap").dump()));
+  o.wrap = parameters.at("wrap").get<bool>();
+  o.detail = needs.level_of_detail;
+  o.vertices = needs.filter == Filter::linear_vertex;
+  o.border = needs.filter == Filter::linear_lod ? 1 : 0;
   return o;
 }
 
@@ -275,11 +297,12 @@ void KdTree::plan_pool(const BuildRequest& request, const Options& o, Plan& p) c
 void KdTree::require_sizes(const BuildRequest& request, const Options& o, const Plan& p) const {
   const auto starts = static_cast<std::int64_t>(p.grid.nodes.size());
   const std::int64_t bricks = o.bindless ? std::max<std::int64_t>(p.brick_count(), 1) : 0;
-  const std::array<std::pair<const char*, std::int64_t>, 7> buffers{
+  const std::array<std::pair<const char*, std::int64_t>, 8> buffers{
       {{"nodes", 8 * p.node_count()},
        {"handles", 8 * bricks * request.field_count()},
        {"brick sizes", needs_brick_sizes(request, o) ? 4 * bricks : 0},
-       {"data nodes", 4 * std::max<std::int64_t>(p.data_words * p.leaf_count(), 1)},
+       {"data nodes", 4 * std::max<std::int64_t>(p.data_words * p.block_count(), 1)},
+       {"levels of data nodes", request.needs.level_of_detail ? 4 * std::max<std::int64_t>(p.block_count(), 1) : 0},
        {"validity bits", 4 * p.validity_words},
        {"the start grid", 4 * static_cast<std::int64_t>(p.grid.entries.size())},
        {"the start grid's nodes", 32 * starts}}};
@@ -295,13 +318,20 @@ void KdTree::require_sizes(const BuildRequest& request, const Options& o, const 
 
 Plan KdTree::plan(const AmrHierarchy& h, const BuildRequest& request, const Options& o) const {
   Plan p;
-  p.tree = build_tree(h);
+  p.tree = build_tree(h, {.wrap = o.wrap, .covers = o.detail, .limits = {}});
+  if (o.detail) add_detail_blocks(h, p.tree);
   p.bricks = make_bricks(p.tree, p.brick_of);
   const bool validity = any_missing(h, request);
-  for (const Leaf& leaf : p.tree.leaves) {
-    p.leaf_cells += leaf.cells.cells();
-    if (validity) p.validity_words += request.field_count() * words_for_bits(leaf.cells.cells());
+  std::vector<std::uint8_t> holds_leaf(p.bricks.size());
+  for (std::size_t i = 0; i < p.tree.leaves.size(); ++i) {
+    const Leaf& block = p.tree.leaves[i];
+    const bool leaf = block.next == kNothingFiner;
+    p.leaf_count += leaf ? 1 : 0;
+    if (leaf) holds_leaf[static_cast<std::size_t>(p.brick_of[i])] = 1;
+    count_block(block, p.leaf_cells, p.detail_cells);
+    if (validity) p.validity_words += request.field_count() * words_for_bits(block.cells.cells());
   }
+  p.leaf_bricks = std::count(holds_leaf.begin(), holds_leaf.end(), 1);
   p.data_words = 1 + (o.bindless ? 1 : 0) + (request.needs.value_ranges ? 1 : 0) + (validity ? 1 : 0);
   if (o.bindless) require_handles(*this, kBindless, p.brick_count(), request);
   plan_pool(request, o, p);
@@ -314,25 +344,32 @@ Plan KdTree::plan(const AmrHierarchy& h, const BuildRequest& request, const Opti
   return p;
 }
 
-/// A texture of one field's values of which `cells` are of bricks, `leaves` of leaf cells and the rest of `texels` borders.
-HostTexture make_values(std::string name, const Vec3i& size, const EncodedField& field, std::int64_t texels, std::int64_t cells,
-                        std::int64_t leaves) {
+/// Texels of one or more bricks, by what they hold.
+struct TexelCounts {
+  std::int64_t all = 0;
+  std::int64_t cells = 0;    ///< of bricks; the rest are borders
+  std::int64_t leaves = 0;   ///< leaf cells among them
+  std::int64_t refined = 0;  ///< cells that are drawn for a level of detail alone
+};
+
+/// A texture of one field's values.
+HostTexture make_values(std::string name, const Vec3i& size, const EncodedField& field, const TexelCounts& n) {
   HostTexture t = make_texture(std::move(name), field.storage, size);
   t.hardware_linear = field.filtering == Filtering::hardware;
   t.holds_values = true;
   const int bytes = texel_bytes(t.format);
-  t.roles.payload = leaves * bytes;
-  t.roles.duplicated = (texels - cells) * bytes;
+  t.roles.payload = n.leaves * bytes;
+  t.roles.duplicated = (n.all - n.cells + n.refined) * bytes;
   t.roles.padding = t.bytes() - t.roles.payload - t.roles.duplicated;
   return t;
 }
 
 std::vector<HostTexture> make_pools(const Plan& p, const EncodedField& field) {
   std::vector<HostTexture> pools;
-  std::int64_t cells = 0;
-  for (const Brick& b : p.bricks) cells += b.cells.cells();
+  TexelCounts n{p.brick_texels, 0, p.leaf_cells, p.detail_cells};
+  for (const Brick& b : p.bricks) n.cells += b.cells.cells();
   for (int number = 0; number < field.field_count; ++number)
-    pools.push_back(make_values(element_name(kPoolName, number), p.packing.size, field, p.brick_texels, cells, p.leaf_cells));
+    pools.push_back(make_values(element_name(kPoolName, number), p.packing.size, field, n));
   return pools;
 }
 
@@ -341,11 +378,10 @@ std::vector<HostTexture> make_brick_textures(const Options& o, const Plan& p, co
   std::vector<HostTexture> textures;
   for (const Brick& b : p.bricks) {
     const Box texels = b.texels(o);
-    std::int64_t leaves = 0;
-    for (const int leaf : b.leaves) leaves += p.tree.leaves[static_cast<std::size_t>(leaf)].cells.cells();
+    TexelCounts n{texels.cells(), b.cells.cells(), 0, 0};
+    for (const int leaf : b.leaves) count_block(p.tree.leaves[static_cast<std::size_t>(leaf)], n.leaves, n.refined);
     for (int number = 0; number < field.field_count; ++number) {
-      HostTexture& t =
-          textures.emplace_back(make_values(kBricksName, texels.size(), field, texels.cells(), b.cells.cells(), leaves));
+      HostTexture& t = textures.emplace_back(make_values(kBricksName, texels.size(), field, n));
       t.handles = kHandlesName;
       t.handle_index = static_cast<std::int64_t>(textures.size()) - 1;
     }
@@ -370,7 +406,7 @@ Stores make_stores(const AmrHierarchy& h, const BuildRequest& request, const Opt
                    const EncodedField& field) {
   Stores out;
   out.values = o.bindless ? make_brick_textures(o, p, field) : make_pools(p, field);
-  out.data = make_buffer("kd_data", TexelFormat::r32ui, p.data_words * p.leaf_count());
+  out.data = make_buffer("kd_data", TexelFormat::r32ui, p.data_words * p.block_count());
   const bool validity = any_missing(h, request);
   if (validity) out.validity = make_buffer("kd_validity", TexelFormat::r32ui, p.validity_words);
   auto* words = out.data.as<std::uint32_t>();
@@ -406,6 +442,12 @@ HostTexture make_nodes(const Tree& tree) {
     *words++ = second_word(n);
   }
   return nodes;
+}
+
+HostTexture make_detail(const Tree& tree) {
+  HostTexture detail = make_buffer("kd_detail", TexelFormat::r32ui, static_cast<std::int64_t>(tree.leaves.size()));
+  std::transform(tree.leaves.begin(), tree.leaves.end(), detail.as<std::uint32_t>(), detail_word);
+  return detail;
 }
 
 void add_start_grid(const AmrHierarchy& h, const Plan& p, EncodedField& field) {
@@ -445,18 +487,18 @@ void add_defines(const Options& o, const Plan& p, EncodedField& field) {
 
 Json statistics(const Options& o, const Plan& p) {
   const Tree& t = p.tree;
-  const auto bricks = static_cast<double>(std::max<std::size_t>(p.bricks.size(), 1));
   Json json;
   json["nodes"] = p.node_count();
   json["fully_refined_nodes"] = t.fully_refined;
   json["mixed_nodes"] = t.mixed;
-  json["leaves"] = p.leaf_count();
+  json["leaves"] = p.leaf_count;
   json["empty_leaves"] = t.empty;
+  if (o.detail) json["detail_blocks"] = p.block_count() - p.leaf_count;
   json["depth"] = t.depth;
   json["subgrids"] = t.subgrids;
   json["cut_subgrids"] = t.cut_subgrids;
   json["bricks"] = p.bricks.size();
-  json["leaves_a_brick"] = static_cast<double>(p.leaf_count()) / bricks;
+  json["leaves_a_brick"] = static_cast<double>(p.leaf_count) / static_cast<double>(std::max<std::int64_t>(p.leaf_bricks, 1));
   json["pool"] = o.bindless ? Json(nullptr) : Json{p.packing.size.x, p.packing.size.y, p.packing.size.z};
   json["fill"] = static_cast<double>(p.brick_texels) / static_cast<double>(std::max<std::int64_t>(p.texels(o), 1));
   json["start_grid"] = o.grid ? Json{p.grid.cells.x, p.grid.cells.y, p.grid.cells.z} : Json(nullptr);
@@ -475,11 +517,11 @@ std::vector<LeftOut> left_out(const AmrHierarchy& h, const BuildRequest& request
   std::vector<LeftOut> list;
   const std::int64_t value_bytes = std::int64_t{request.field_count()} * texel_bytes(request.storage);
   if (!any_missing(h, request)) {
-    std::int64_t words = p.leaf_count();
+    std::int64_t words = p.block_count();
     for (const Leaf& leaf : p.tree.leaves) words += request.field_count() * words_for_bits(leaf.cells.cells());
     list.push_back({"validity bits", "every cell has a value", 4 * words});
   }
-  if (!request.needs.value_ranges) list.push_back({"value ranges", "no region is skipped", 4 * p.leaf_count()});
+  if (!request.needs.value_ranges) list.push_back({"value ranges", "no region is skipped", 4 * p.block_count()});
   if (const std::int64_t cells = undrawn_cells(h, p); cells > 0)
     list.push_back({"refined parts of subgrids", "no level of detail is drawn", cells * value_bytes});
   if (!o.vertices && o.border == 0) {
@@ -494,7 +536,7 @@ EncodedField KdTree::build(const AmrHierarchy& h, const BuildRequest& request) c
   require_filter(*this, request.needs.filter);
   require_fields(*this, h, request);
   const Json parameters = complete_parameters(*this, request.parameters);
-  const Options o = options(parameters, request.needs.filter);
+  const Options o = options(parameters, request.needs);
   const Plan p = plan(h, request, o);
 
   EncodedField field = start_field(*this, h, request, parameters);
@@ -504,6 +546,7 @@ EncodedField KdTree::build(const AmrHierarchy& h, const BuildRequest& request) c
   field.left_out = left_out(h, request, o, p);
   field.textures.push_back(make_nodes(p.tree));
   field.textures.push_back(std::move(stores.data));
+  if (o.detail) field.textures.push_back(make_detail(p.tree));
   if (o.grid) add_start_grid(h, p, field);
   if (o.bindless) {
     add_handles(request, o, p, field);

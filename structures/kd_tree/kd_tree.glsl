@@ -58,6 +58,9 @@ VALUE_TEXTURE_SET(tex_kd_bricks, kd_handles, kd_handles_block)  // AMRTEX_FIELDS
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING && AMRTEX_KD_BINDLESS
 BUFFER(uint, kd_brick_sizes, kd_brick_sizes_block)  // last texel of each brick
 #endif
+#if AMRTEX_CPP || AMRTEX_LEVEL_OF_DETAIL
+BUFFER(uint, kd_detail, kd_detail_block)  // a word a data node: its cells, and what takes their place
+#endif
 #if AMRTEX_CPP || AMRTEX_VALIDITY
 BUFFER(uint, kd_validity, kd_validity_block)  // one bit a cell, each field of each data node from a new word
 #endif
@@ -88,10 +91,37 @@ int kd_begin(IN(ivec3) cell, INOUT(Region) r) {
 
 int kd_component(IN(ivec3) v, IN(int) axis) { return axis == 0 ? v.x : (axis == 1 ? v.y : v.z); }
 
-// The leaf that holds a cell; r.lower and r.upper become its box.
-uvec2 kd_find_leaf(IN(ivec3) cell, INOUT(Region) r) {
+#if AMRTEX_CPP || AMRTEX_LEVEL_OF_DETAIL
+// The coarsest data node of a node with box r that suffices, and its level; AMRTEX_KD_NO_DATA where none does. A leaf's own always does:
+// nothing takes its place.
+int kd_sufficient(IN(uvec2) node, INOUT(Region) r) {
+  int data = kd_data_index(node);
+  bool more = data != AMRTEX_KD_NO_DATA;
+  int i = 0;
+  if (more) {
+    do {
+      uint word = kd_detail[data + i];
+      int next = int((word >> uint(AMRTEX_KD_LEVEL_BITS)) & uint((2 << AMRTEX_KD_LEVEL_BITS) - 1));
+      r.level = int(word & uint((1 << AMRTEX_KD_LEVEL_BITS) - 1));
+      if (level_suffices(r.lower, r.upper, r.level, next)) return data + i;
+      more = ((word >> uint(AMRTEX_KD_DETAIL_LAST_BIT)) & 1u) == 0u;
+      i += 1;
+    } while (more && i < AMRTEX_LEVELS);
+  }
+  return AMRTEX_KD_NO_DATA;
+}
+#endif
+
+// The leaf that holds a cell, or the node above it that is drawn in its place. r receives its box and level; `data`: its data node.
+void kd_find_leaf(IN(ivec3) cell, INOUT(Region) r, OUT(int) data) {
   uvec2 node = kd_nodes[kd_begin(cell, r)];
   int child = kd_first_child(node);
+  data = AMRTEX_KD_NO_DATA;
+#if AMRTEX_CPP || AMRTEX_LEVEL_OF_DETAIL
+  r.level = kd_level(node);
+  if (AMRTEX_LEVEL_OF_DETAIL != 0) data = kd_sufficient(node, r);
+  if (data != AMRTEX_KD_NO_DATA) child = 0;
+#endif
   int steps = 0;
   if (child != 0) {
     do {
@@ -105,9 +135,17 @@ uvec2 kd_find_leaf(IN(ivec3) cell, INOUT(Region) r) {
       node = kd_nodes[child + (above ? 1 : 0)];
       child = kd_first_child(node);
       steps += 1;
+#if AMRTEX_CPP || AMRTEX_LEVEL_OF_DETAIL
+      r.level = kd_level(node);
+      if (AMRTEX_LEVEL_OF_DETAIL != 0) data = kd_sufficient(node, r);
+      if (data != AMRTEX_KD_NO_DATA) child = 0;
+#endif
     } while (child != 0 && steps < AMRTEX_KD_DEPTH);
   }
-  return node;
+  if (AMRTEX_LEVEL_OF_DETAIL == 0) {
+    r.level = kd_level(node);
+    data = kd_data_index(node);
+  }
 }
 
 // A packed texel of the pool or of a brick.
@@ -118,8 +156,8 @@ ivec3 kd_texel_position(IN(uint) position) {
 }
 
 bool locate(IN(Position) p, OUT(Region) r) {
-  uvec2 node = kd_find_leaf(p.cell, r);
-  r.level = kd_level(node);
+  int data = AMRTEX_KD_NO_DATA;
+  kd_find_leaf(p.cell, r, data);
   r.width = level_width(r.level);
   r.value_range = vec2r(0);
   r.handle = ivec4(0);
@@ -132,7 +170,6 @@ bool locate(IN(Position) p, OUT(Region) r) {
 #endif
   r.texture_lower = vec3r(0);
 #endif
-  int data = kd_data_index(node);
   if (data == AMRTEX_KD_NO_DATA) return false;
   data *= AMRTEX_KD_DATA_WORDS;
   ivec3 texel = kd_texel_position(kd_data[data]);

@@ -3,11 +3,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <chrono>
 
 #include "renderers/raycaster.hpp"
 #include "structures/kd_tree/brick_packing.hpp"
+#include "structures/kd_tree/kd_detail.hpp"
 #include "structures/kd_tree/kd_partition.hpp"
 #include "structures/kd_tree/start_grid.hpp"
 #include "structures/random_mesh.hpp"
@@ -77,7 +79,7 @@ TEST(KdTree, NodesHoldWhatTheLayoutSays) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const AmrHierarchy h(random_mesh(seed));
     const kd::Tree tree = kd::build_tree(h);
-    const EncodedField field = kd_field(h, Filter::nearest);
+    const EncodedField field = kd_field(h, Filter::nearest, {{"wrap", false}});
     ASSERT_EQ(field.find("kd_nodes")->texels(), static_cast<std::int64_t>(tree.nodes.size()));
     for (std::size_t i = 0; i < tree.nodes.size(); ++i) {
       const kd::Node& n = tree.nodes[i];
@@ -195,23 +197,142 @@ TEST(KdTree, EveryLeafCellOfRandomMeshesLiesInOneDrawnNodeOfItsLevel) {
   }
 }
 
-TEST(KdTree, TenThousandSubgridsTakeSeconds) {
-  // every other block of a checkerboard is refined: 10 976 subgrids of 4^3 cells, none beside another
-  MeshBuilder mesh(Vec3i(56), {2});
+/// Every other block of a checkerboard is refined: blocks^3 / 2 subgrids of 4^3 cells, none beside another.
+AmrHierarchy checkerboard(int blocks) {
+  MeshBuilder mesh(Vec3i(2 * blocks), {2});
   mesh.root(constant(1));
-  int subgrids = 0;
-  for_each_cell({Vec3i(0), Vec3i(28)}, [&](const Vec3i& b) {
+  for_each_cell({Vec3i(0), Vec3i(blocks)}, [&](const Vec3i& b) {
     if ((b.x + b.y + b.z) % 2 == 0) mesh.patch(1, {b * 4, (b + 1) * 4}, constant(2));
-    subgrids += (b.x + b.y + b.z) % 2 == 0 ? 1 : 0;
   });
-  const AmrHierarchy h = mesh.hierarchy();
-  ASSERT_EQ(subgrids, 10976);
+  return mesh.hierarchy();
+}
+
+TEST(KdTree, ThePartitionDoesNotDependOnThreads) {
+  const AmrHierarchy h = checkerboard(20);
+  const auto nodes = [&](std::size_t threads, bool covers) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    kd::Tree tree = kd::build_tree(h, {.wrap = false, .covers = covers, .limits = {}});
+    if (covers) kd::add_detail_blocks(h, tree);
+    std::vector<std::uint32_t> words;
+    for (const kd::Node& n : tree.nodes) words.insert(words.end(), {kd::first_word(n), kd::second_word(n)});
+    for (const kd::Leaf& l : tree.leaves) words.insert(words.end(), {kd::detail_word(l), static_cast<std::uint32_t>(l.patch)});
+    return words;
+  };
+  for (const bool covers : {false, true}) EXPECT_EQ(nodes(1, covers), nodes(4, covers));
+}
+
+TEST(KdTree, TenThousandSubgridsTakeSeconds) {
+  const AmrHierarchy h = checkerboard(28);
+  ASSERT_EQ(h.patches(1).size(), 10976U);
   const auto start = std::chrono::steady_clock::now();
   const kd::Tree tree = kd::build_tree(h);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   EXPECT_LT(seconds.count(), 5);
   EXPECT_LE(tree.depth, 64);
   RecordProperty("milliseconds", static_cast<int>(1000 * seconds.count()));
+}
+
+// ---- wrapping
+
+/// Leaf blocks, after a check that they hold each leaf cell of the mesh once.
+std::size_t leaves_of(const AmrHierarchy& h, bool wrap) {
+  const kd::Tree tree = kd::build_tree(h, {.wrap = wrap, .covers = false, .limits = {}});
+  std::int64_t cells = 0;
+  for (const kd::Leaf& leaf : tree.leaves) {
+    const Box& patch = h.patches(leaf.level)[static_cast<std::size_t>(leaf.patch)].box;
+    EXPECT_TRUE(patch.contains(leaf.cells));
+    const auto mask = h.leaf_mask(leaf.level, leaf.patch);
+    for_each_cell(leaf.cells, [&](const Vec3i& c) {
+      EXPECT_EQ(mask[patch.offset(c)], 1);
+      ++cells;
+    });
+  }
+  EXPECT_EQ(cells, h.leaf_cells());  // nodes divide the domain: each once
+  return tree.leaves.size();
+}
+
+TEST(KdTree, WrappingSavesLeavesWhereSubgridsLieTogether) {
+  // after figure 9 of Kaehler & Hege 2002: a row of subgrids in the middle of a large region. The planes between them cut the
+  // region around into as many parts; its six sides first leave the subgrids' own box alone.
+  MeshBuilder mesh({24, 12, 12}, {2});
+  mesh.root(waves);
+  for (int i = 0; i < 5; ++i) mesh.patch(1, {{8 + 6 * i, 8, 8}, {14 + 6 * i, 16, 16}}, waves);
+  const AmrHierarchy h = mesh.hierarchy();
+  EXPECT_EQ(leaves_of(h, true), 6U + 5U);
+  EXPECT_GT(leaves_of(h, false), 11U);
+  EXPECT_EQ(kd_field(h, Filter::nearest, {{"wrap", true}}).statistics["leaves"], 11);
+}
+
+TEST(KdTree, WrappedLeavesStillPartitionRandomMeshesAndAreFewer) {
+  std::size_t wrapped = 0;
+  std::size_t plain = 0;
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    SCOPED_TRACE(seed);
+    const AmrHierarchy h(random_mesh(seed));
+    wrapped += leaves_of(h, true);
+    plain += leaves_of(h, false);
+  }
+  EXPECT_LE(wrapped, plain) << "in all; a single mesh may have more";
+}
+
+// ---- level of detail
+
+TEST(KdTree, DetailBlocksAreTheRefinedCellsOfEachSubgridOnce) {
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    SCOPED_TRACE(seed);
+    const AmrHierarchy h(random_mesh(seed));
+    kd::Tree tree = kd::build_tree(h, {.wrap = false, .covers = true, .limits = {}});
+    kd::add_detail_blocks(h, tree);
+    const std::vector<Box> boxes = kd::node_boxes(h, tree);
+    std::int64_t cells = 0;
+    for (std::size_t i = 0; i < tree.nodes.size(); ++i) {
+      if (tree.nodes[i].leaf < 0) continue;
+      for (auto k = static_cast<std::size_t>(tree.nodes[i].leaf);; ++k) {
+        const kd::Leaf& block = tree.leaves[k];
+        const Box& patch = h.patches(block.level)[static_cast<std::size_t>(block.patch)].box;
+        EXPECT_EQ(block.cells.refined(h.cell_width(block.level)), boxes[i]) << "whole cells";
+        EXPECT_TRUE(patch.contains(block.cells));
+        EXPECT_GT(block.next, block.level);
+        const auto mask = h.leaf_mask(block.level, block.patch);
+        const bool leaf = block.next == kd::kNothingFiner;
+        for_each_cell(block.cells, [&](const Vec3i& c) { EXPECT_EQ(mask[patch.offset(c)] != 0, leaf); });
+        if (!block.repeated) cells += block.cells.cells();
+        EXPECT_EQ(leaf, block.last && tree.nodes[i].first_child == 0);
+        if (block.last) break;
+      }
+    }
+    // a cell that several subgrids of a much finer level share is drawn at no node where their face divides it
+    EXPECT_LE(cells, h.stored_cells());
+    EXPECT_GE(cells, h.leaf_cells());
+    const kd::StartGrid grid = kd::make_start_grid(h, tree, 1000);
+    for (const std::uint32_t node : grid.nodes) {  // no start below a node that may be drawn
+      for (std::size_t i = 0; i < tree.nodes.size(); ++i)
+        EXPECT_FALSE(i != node && tree.nodes[i].leaf >= 0 && tree.nodes[i].first_child != 0 && boxes[i].contains(boxes[node]) &&
+                     boxes[i] != boxes[node]);
+    }
+  }
+}
+
+TEST(KdTree, DetailOfAHandMadeMesh) {
+  // the whole root is refined by two subgrids: one block of the root's 4 x 2 x 2 cells, two leaves
+  const AmrHierarchy covered = MeshBuilder({4, 2, 2}, {2})
+                                   .root(waves)
+                                   .patch(1, {{0, 0, 0}, {4, 4, 4}}, waves)
+                                   .patch(1, {{4, 0, 0}, {8, 4, 4}}, waves)
+                                   .hierarchy();
+  const EncodedField field = kd_field(covered, Filter::nearest, Json::object(), {.level_of_detail = true});
+  EXPECT_EQ(field.statistics["detail_blocks"], 1);
+  EXPECT_EQ(field.statistics["leaves"], 2);
+  EXPECT_EQ(field.statistics["leaves_a_brick"], 1.0) << "the root's brick holds no leaf";
+  EXPECT_EQ(field.statistics["bricks"], 3);
+  EXPECT_EQ(field.find("tex_kd_pool")->roles.payload, 4 * 2 * 64);
+  EXPECT_EQ(field.find("tex_kd_pool")->roles.duplicated, 4 * 16);
+  const auto* words = field.find("kd_detail")->as<std::uint32_t>();
+  EXPECT_EQ(words[0], 0U | (1U << 6) | (1U << 13)) << "level 0, refined by 1, alone in its node";
+  EXPECT_EQ(words[1], 1U | (64U << 6) | (1U << 13)) << "level 1, refined by nothing";
+  const EncodedField without = kd_field(covered, Filter::nearest);
+  EXPECT_EQ(without.find("kd_detail"), nullptr);
+  EXPECT_EQ(without.statistics["bricks"], 2);
 }
 
 // ---- the pool
@@ -340,6 +461,18 @@ TEST(KdTree, TraversalsAndPackingsGiveTheSameBits) {
   }
 }
 
+TEST(KdTree, TreesWithoutWrappingHoldTheSameField) {
+  for (std::uint64_t seed = 0; seed < 24; ++seed) {
+    SCOPED_TRACE(seed);
+    const AmrHierarchy h(random_mesh(seed));
+    const auto positions = probe_positions(h, 20, seed);
+    for (const Filter filter : {Filter::nearest, Filter::linear_lod, Filter::linear_vertex}) {
+      const Comparison result = compare_double(h, kd_field(h, filter, {{"wrap", false}}, {.storage = Storage::r64f}), positions);
+      EXPECT_TRUE(result) << result;
+    }
+  }
+}
+
 TEST(KdTree, TraversalsGiveTheSamePicture) {
   Context& gl = context(ContextKind::egl);
   for (const MeshBuilder& mesh : {nested(waves), holes_and_missing(waves, 3)}) {
@@ -425,6 +558,61 @@ TEST(KdTree, RefusesWhatItsBitsCannotTell) {
   EXPECT_THAT(refusal(wide, {}), AllOf(HasSubstr("unsupported: encoding kd_tree"), HasSubstr("8000 cells"), HasSubstr("4095")));
 }
 
+std::string partition_refusal(const AmrHierarchy& h, const kd::PartitionOptions& options) {
+  try {
+    kd::Tree tree = kd::build_tree(h, options);
+    if (options.covers) kd::add_detail_blocks(h, tree, options.limits);
+    return "built";
+  } catch (const UnsupportedError& e) {
+    return e.what();
+  }
+}
+
+TEST(KdTree, RefusesMoreThanANodeCanTell) {
+  // the numbers of the layout are too large for a test: the same code with smaller ones
+  EXPECT_EQ(kd::kMostNodes, 1 << 24);
+  EXPECT_EQ(kd::kMostLeaves, (1 << 20) - 1);
+  EXPECT_EQ(kd::kMostLevels, 64);
+  EXPECT_EQ(kd::kMostSplit, 4095);
+  const AmrHierarchy h = refined_corner();  // 7 nodes, 4 leaves, 2 levels, planes 4 cells from a corner
+  kd::PartitionOptions o;
+  o.limits = {.levels = 2, .nodes = 7, .blocks = 4, .split = 4};
+  EXPECT_EQ(partition_refusal(h, o), "built");
+  o.limits.nodes = 6;
+  EXPECT_THAT(partition_refusal(h, o), AllOf(HasSubstr("encoding kd_tree"), HasSubstr("more than 6 nodes")));
+  o.limits = {.levels = 2, .nodes = 7, .blocks = 3, .split = 4};
+  EXPECT_THAT(partition_refusal(h, o), AllOf(HasSubstr("encoding kd_tree"), HasSubstr("more than 3 blocks")));
+  o.limits = {.levels = 1, .nodes = 7, .blocks = 4, .split = 4};
+  EXPECT_THAT(partition_refusal(h, o), AllOf(HasSubstr("2 levels"), HasSubstr("at most 1")));
+  o.limits = {.levels = 2, .nodes = 7, .blocks = 4, .split = 3};
+  EXPECT_THAT(partition_refusal(h, o), AllOf(HasSubstr("4 cells of level 0"), HasSubstr("at most 3")));
+  // with a level of detail the corner's refined root cells are a fifth block
+  o.limits = {.levels = 2, .nodes = 7, .blocks = 4, .split = 4};
+  o.covers = true;
+  EXPECT_THAT(partition_refusal(h, o), HasSubstr("more than 4 blocks"));
+}
+
+TEST(KdTree, RefusesMoreThanASubtreeOfManyMayAdd) {
+  const AmrHierarchy h = checkerboard(20);  // 4000 subgrids: subtrees are built side by side
+  const auto blocks = static_cast<std::int64_t>(kd::build_tree(h).leaves.size());
+  kd::PartitionOptions o;
+  o.limits.blocks = blocks;
+  EXPECT_EQ(partition_refusal(h, o), "built");
+  o.limits.blocks = blocks - 1;
+  EXPECT_THAT(partition_refusal(h, o), HasSubstr(fmt::format("more than {} blocks", blocks - 1)));
+}
+
+TEST(KdTree, MoreLevelsThanANodeTellsAreNoMesh) {
+  // the mesh is refused before any encoding
+  MeshDescription mesh = MeshBuilder(Vec3i(1), std::vector<int>(69, 2)).root(waves).description();
+  try {
+    const AmrHierarchy h(mesh);
+    FAIL() << "accepted " << h.level_count() << " levels";
+  } catch (const Error& e) {
+    EXPECT_THAT(e.what(), HasSubstr("70 levels; at most 64"));
+  }
+}
+
 TEST(KdTree, NamesTheLimitThatItWouldPass) {
   const AmrHierarchy h = refined_corner();
   BuildRequest request;
@@ -446,6 +634,9 @@ TEST(KdTree, RefusesBadParametersWithWhatIsAccepted) {
       request.parameters = {{name, bad}};
       EXPECT_THAT(refusal(h, request), AllOf(HasSubstr("usage: encoding kd_tree"), HasSubstr(name), HasSubstr("accepted: \"")));
     }
+  BuildRequest wrap;
+  wrap.parameters = {{"wrap", 1}};
+  EXPECT_THAT(refusal(h, wrap), AllOf(HasSubstr("usage: encoding kd_tree"), HasSubstr("wrap"), HasSubstr("true or false")));
 }
 
 // ---- bindless: a texture a brick

@@ -312,6 +312,9 @@ class PageTable final : public Encoding {
   }
   void check_parameters(const Json& parameters) const override { values(parameters); }
   Support supported(const ContextInfo&) const override { return {}; }
+  Support level_of_detail() const override {
+    return {false, "a page is stored at the finest level that it holds, and at no other"};
+  }
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
@@ -609,6 +612,7 @@ std::vector<LeftOut> left_out(const Options& o, const TablePlan& table, std::int
 
 EncodedField PageTable::build(const AmrHierarchy& h, const BuildRequest& request) const {
   require_filter(*this, request.needs.filter);
+  require_level_of_detail(*this, request.needs);
   require_fields(*this, h, request);
   const Json parameters = complete_parameters(*this, request.parameters);
   const Options o = options(parameters, request.needs.filter);

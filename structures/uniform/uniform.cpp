@@ -47,6 +47,7 @@ class Uniform final : public Encoding {
   }
   void check_parameters(const Json& parameters) const override { level(parameters, std::numeric_limits<int>::max()); }
   Support supported(const ContextInfo&) const override { return {}; }
+  Support level_of_detail() const override { return {false, "its one texture holds one level (parameter level)"}; }
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
@@ -235,6 +236,7 @@ EncodedField Uniform::build(const AmrHierarchy& h, const BuildRequest& request) 
 
 EncodedField Uniform::build_blocks(const AmrHierarchy& h, const BuildRequest& request) const {
   require_filter(*this, request.needs.filter);
+  require_level_of_detail(*this, request.needs);
   require_fields(*this, h, request);
   const Json parameters = complete_parameters(*this, request.parameters);
   const Plan p = plan(h, request, parameters);
