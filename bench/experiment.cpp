@@ -23,12 +23,11 @@ constexpr int kMaxPictureEdge = 16384;
 constexpr int kMaxFrames = 1000000;
 constexpr double kAnyNumber = std::numeric_limits<double>::max();
 
-constexpr std::array<std::string_view, 16> kAvailableRenderKeys = {
-    "mode",       "sampling",  "step",        "width",         "height",        "skip",    "early_end", "consumer",
-    "integrator", "isovalues", "iso_opacity", "surface_color", "iso_tolerance", "shading", "output",    "color_field"};
-constexpr std::array<std::string_view, 4> kLaterRenderKeys = {"tolerance", "prune", "level_of_detail", "clip_planes"};
+constexpr std::array<std::string_view, 17> kAvailableRenderKeys = {
+    "mode",      "sampling",    "step",          "width",         "height",  "skip",   "early_end",   "consumer", "integrator",
+    "isovalues", "iso_opacity", "surface_color", "iso_tolerance", "shading", "output", "color_field", "tolerance"};
+constexpr std::array<std::string_view, 3> kLaterRenderKeys = {"prune", "level_of_detail", "clip_planes"};
 constexpr std::array<std::string_view, 1> kConsumers = {"raycast"};
-constexpr std::array<std::string_view, 1> kIntegrators = {"exponential_midpoint"};
 constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
 
 /// How many lists deep one value of this key is; what lies deeper is an axis.
@@ -356,12 +355,27 @@ class Parser {
   static RenderPoint parse_setting(const Choice& choice) {
     RenderPoint point;
     for (const auto& [key, node] : choice) set(point, key, node);
+    finish_integrator(point.settings, choice);
     if (!point.settings.draws_volume()) point.settings.early_end.reset();  // no opacity to end at
     if (point.settings.draws_surfaces())
       finish_surfaces(point.settings.isosurfaces, choice);
     else
       point.settings.isosurfaces = {};  // other modes have no use for it
     return point;
+  }
+
+  /// A tolerance without integrator asks for the one that knows it; others have no use for it, as that has none for a step.
+  static void finish_integrator(RenderSettings& s, const Choice& choice) {
+    const JsonNode* tolerance = find(choice, "tolerance");
+    const JsonNode* integrator = find(choice, "integrator");
+    if (tolerance != nullptr && integrator == nullptr) s.integrator = Integrator::tolerance;
+    if (s.integrator != Integrator::tolerance) s.tolerance = RenderSettings{}.tolerance;
+    if (s.integrator == Integrator::tolerance) s.step = RenderSettings{}.step;
+    try {
+      validate_integrator(s);
+    } catch (const Error& e) {
+      (integrator != nullptr ? integrator : tolerance)->fail(e.what());
+    }
   }
 
   /// One opacity stands for all isovalues; complaints name the key they are about.
@@ -408,6 +422,12 @@ class Parser {
     if (key == "color_field" && !node.json().is_null()) iso.color_field = node.text();
   }
 
+  static double tolerance_of(const JsonNode& node) {
+    const double tolerance = node.positive_number();
+    if (tolerance > 1) node.fail(fmt::format("{} is more than a channel holds; accepted: a number in (0, 1]", tolerance));
+    return tolerance;
+  }
+
   static void set(RenderPoint& point, const std::string& key, const JsonNode& node) {
     RenderSettings& s = point.settings;
     set_surfaces(s.isosurfaces, key, node);
@@ -419,7 +439,8 @@ class Parser {
     if (key == "skip") s.skip = node.boolean();
     if (key == "early_end" && !node.json().is_null()) s.early_end = node.number(0, 1);
     if (key == "consumer") point.consumer = node.one_of(kConsumers);
-    if (key == "integrator") point.integrator = node.one_of(kIntegrators);
+    if (key == "integrator") s.integrator = located(node, [&] { return parse_integrator(node.text()); });
+    if (key == "tolerance") s.tolerance = tolerance_of(node);
   }
 
   /// Where the parser of views or transfer functions complains about a combination.
@@ -602,11 +623,12 @@ Json surfaces_json(const Isosurfaces& iso) {
 
 Json render_json(const RenderPoint& render) {
   const RenderSettings& s = render.settings;
+  const bool by_tolerance = s.integrator == Integrator::tolerance;
   Json json = {{"consumer", render.consumer},
                {"mode", mode_name(s.mode)},
                {"sampling", sampling_name(s.sampling)},
-               {"step", s.step},
-               {"integrator", render.integrator},
+               {"step", by_tolerance ? Json() : Json(s.step)},
+               {"integrator", integrator_name(s.integrator)},
                {"width", s.width},
                {"height", s.height},
                {"skip", s.skip},
@@ -615,6 +637,7 @@ Json render_json(const RenderPoint& render) {
                {"view_name", render.view_name},
                {"transfer_function", nullptr},
                {"transfer_function_name", nullptr}};
+  if (by_tolerance) json["tolerance"] = s.tolerance;
   if (s.draws_surfaces()) json.update(surfaces_json(s.isosurfaces));
   if (!render.transfer_function_name.empty()) {
     json["transfer_function"] = to_json(render.transfer_function);

@@ -204,6 +204,44 @@ int RenderSettings::picture_channels() const {
 
 std::string_view sampling_name(Sampling sampling) { return sampling == Sampling::lattice ? "lattice" : "adaptive"; }
 
+std::string_view integrator_name(Integrator integrator) {
+  switch (integrator) {
+    case Integrator::exponential_midpoint:
+      return "exponential_midpoint";
+    case Integrator::euler:
+      return "euler";
+    case Integrator::left:
+      return "left";
+    case Integrator::preintegrated:
+      return "preintegrated";
+    case Integrator::tolerance:
+      return "tolerance";
+  }
+  return "";
+}
+
+Integrator parse_integrator(std::string_view name) {
+  if (name == "midpoint") return Integrator::exponential_midpoint;
+  for (const Integrator integrator :
+       {Integrator::exponential_midpoint, Integrator::euler, Integrator::left, Integrator::preintegrated, Integrator::tolerance})
+    if (name == integrator_name(integrator)) return integrator;
+  throw UsageError(fmt::format(
+      "unknown integrator '{}'; accepted are exponential_midpoint (or midpoint), euler, left, preintegrated, tolerance", name));
+}
+
+void validate_integrator(const RenderSettings& s) {
+  if (s.integrator == Integrator::exponential_midpoint) return;
+  if (s.mode != Mode::dvr)
+    throw UsageError(fmt::format("the mode {} takes the integrator exponential_midpoint alone; {} accepts the mode dvr",
+                                 mode_name(s.mode), integrator_name(s.integrator)));
+  if (s.integrator != Integrator::tolerance) return;
+  if (s.sampling != Sampling::adaptive)
+    throw UsageError("the integrator tolerance chooses its intervals: it accepts the sampling adaptive, not lattice");
+  if (!(s.tolerance > 0 && s.tolerance <= 1))
+    throw UsageError(
+        fmt::format("the tolerance {} is the error asked of a channel of a pixel; it must lie in (0, 1]", s.tolerance));
+}
+
 Mode parse_mode(std::string_view name) {
   for (const Mode mode : {Mode::dvr, Mode::projection, Mode::mip, Mode::iso, Mode::dvr_iso})
     if (name == mode_name(mode)) return mode;

@@ -73,6 +73,9 @@ void validate(const TransferFunction& transfer_function);
 /// `iso` draws isosurfaces, `dvr_iso` isosurfaces inside the volume.
 enum class Mode { dvr, projection, mip, iso, dvr_iso };
 enum class Sampling { lattice, adaptive };
+/// How the light of an interval follows from samples (shaders/README.md, "Integrators"). `euler` and `left` are controls
+/// of order one; `tolerance` chooses its intervals itself.
+enum class Integrator { exponential_midpoint, euler, left, preintegrated, tolerance };
 /// What a picture of isosurfaces holds: colour; world distance from the ray's origin to the first surface,
 /// 0 where there is none; or the unit normal there (the gradient's direction), alpha 1, else all 0.
 enum class Output { color, depth, normal };
@@ -80,11 +83,13 @@ enum class Output { color, depth, normal };
 enum class Shading { none, gradient };
 std::string_view mode_name(Mode mode);
 std::string_view sampling_name(Sampling sampling);
+std::string_view integrator_name(Integrator integrator);
 std::string_view output_name(Output output);
 std::string_view shading_name(Shading shading);
 /// These throw UsageErrors that name the accepted ones.
 Mode parse_mode(std::string_view name);
 Sampling parse_sampling(std::string_view name);
+Integrator parse_integrator(std::string_view name);
 Output parse_output(std::string_view name);
 Shading parse_shading(std::string_view name);
 
@@ -108,6 +113,8 @@ void validate(const Isosurfaces& isosurfaces);
 struct RenderSettings {
   Mode mode = Mode::dvr;
   Sampling sampling = Sampling::adaptive;
+  Integrator integrator = Integrator::exponential_midpoint;
+  double tolerance = 1e-3;          ///< error asked of every channel of a pixel; integrator `tolerance` alone
   double step = 1;                  ///< cell widths (smallest edge): of the finest level for lattice, of the region for adaptive
   int width = 512;                  ///< pixels
   int height = 512;                 ///< pixels
@@ -120,6 +127,9 @@ struct RenderSettings {
   /// Premultiplied colour (4 channels), or one raw number.
   int picture_channels() const;
 };
+
+/// Throws UsageError where the integrator does not go with the mode, the sampling or the tolerance.
+void validate_integrator(const RenderSettings& settings);
 
 struct Scene {
   View view;
