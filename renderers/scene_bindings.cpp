@@ -224,7 +224,7 @@ double extinction_unit(const AmrHierarchy& h, const Scene& scene) {
 constexpr double kLongestInterval = 8;
 /// Error that one interval may have: a smaller tolerance needs more of them, so each gets a smaller part. Errors of
 /// intervals cancel in part, and corrected ones are smaller than estimated; the factor is measured (experiments/tolerance).
-double interval_error(double tolerance) { return 2 * std::pow(tolerance, 1.25); }
+double interval_error(double tolerance) { return 1.2 * std::pow(tolerance, 1.25); }
 /// Part of the tolerance that a ray may leave behind it.
 constexpr double kToleranceLeft = 0.1;
 
