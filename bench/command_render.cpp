@@ -15,6 +15,7 @@ struct Arguments {
   bool reference = false;
   bool color_bar = false;
   double reference_step = 0;
+  std::optional<double> tolerance;
 };
 
 void write_picture(const Arguments& a, const Picture& picture, const Experiment& scene, const AmrHierarchy& mesh) {
@@ -31,6 +32,19 @@ void write_picture(const Arguments& a, const Picture& picture, const Experiment&
   write_png(picture, path, options);
 }
 
+/// An error asked for replaces the scene's step.
+RenderPoint with_tolerance(RenderPoint point, const std::optional<double>& tolerance) {
+  if (!tolerance) return point;
+  point.settings.integrator = Integrator::tolerance;
+  point.settings.tolerance = *tolerance;
+  try {
+    validate_integrator(point.settings);
+  } catch (const UsageError& e) {
+    throw UsageError(fmt::format("--tolerance: {}", e.what()));
+  }
+  return point;
+}
+
 int run(const Arguments& a) {
   const std::string extension = fs::path(a.output).extension();
   if (extension != ".png" && extension != ".npy")
@@ -38,7 +52,7 @@ int run(const Arguments& a) {
   const Experiment scene = read_scene(a.scene);
   const BuildPoint& build = scene.builds.front();
   const AmrHierarchy mesh = load_dataset(scene, scene.datasets[build.dataset]);
-  const Scene drawn = scene_of(scene, scene.renders.front());
+  const Scene drawn = scene_of(scene, with_tolerance(scene.renders.front(), a.tolerance));
   const auto context = make_context(parse_context_kind(a.context.empty() ? scene.context : a.context));
   BuildRequest request;
   request.storage = build.storage;
@@ -79,6 +93,8 @@ void add_render_command(CLI::App& app, Command& chosen) {
   c->add_option("--memory-limit", a->memory_limit, "for the structure, as 512MiB");
   c->add_flag("--reference", a->reference, "draw the double-precision reference of the filter instead");
   c->add_option("--reference-step", a->reference_step, "its step, in widths of the finest cells");
+  c->add_option("--tolerance", a->tolerance,
+                "error asked of every channel, in (0, 1]: the steps follow; volumes, adaptive sampling");
   c->add_flag("--color-bar", a->color_bar, "a bar with the range, for the modes projection and mip");
   c->footer("Example: amrtex render experiments/limits/scene.json -o picture.png");
   c->callback([a, &chosen] { chosen = [a] { return run(*a); }; });

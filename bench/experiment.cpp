@@ -27,9 +27,8 @@ constexpr double kAnyNumber = std::numeric_limits<double>::max();
 constexpr auto kAvailableRenderKeys = std::to_array<std::string_view>(
     {"mode",         "sampling",    "step",      "width",       "height",          "skip",          "early_end", "consumer",
      "slice_target", "integrator",  "isovalues", "iso_opacity", "surface_color",   "iso_tolerance", "shading",   "output",
-     "color_field",  "point_light", "ambient",   "shadow_step", "level_of_detail", "max_level"});
-constexpr std::array<std::string_view, 3> kLaterRenderKeys = {"tolerance", "prune", "clip_planes"};
-constexpr std::array<std::string_view, 1> kIntegrators = {"exponential_midpoint"};
+     "color_field",  "point_light", "ambient",   "shadow_step", "level_of_detail", "max_level",     "tolerance"});
+constexpr std::array<std::string_view, 2> kLaterRenderKeys = {"prune", "clip_planes"};
 constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
 
 /// How many lists deep one value of this key is; what lies deeper is an axis.
@@ -357,6 +356,7 @@ class Parser {
   static RenderPoint parse_setting(const Choice& choice) {
     RenderPoint point;
     for (const auto& [key, node] : choice) set(point, key, node);
+    finish_integrator(point.settings, choice);
     if (!point.settings.draws_volume()) point.settings.early_end.reset();                    // no opacity to end at
     if (!point.settings.draws_slices()) point.settings.slice_target = SliceTarget::rgba32f;  // nothing is blended there
     if (point.settings.draws_surfaces())
@@ -382,6 +382,20 @@ class Parser {
     if (const JsonNode* node = find(choice, "ambient")) light.ambient = node->number(0, 1);
     if (const JsonNode* node = find(choice, "shadow_step")) light.shadow_step = node->positive_number();
     located(*position, [&] { validate_light(s); });
+  }
+
+  /// A tolerance without integrator asks for the one that knows it; others have no use for it, as that has none for a step.
+  static void finish_integrator(RenderSettings& s, const Choice& choice) {
+    const JsonNode* tolerance = find(choice, "tolerance");
+    const JsonNode* integrator = find(choice, "integrator");
+    if (tolerance != nullptr && integrator == nullptr) s.integrator = Integrator::tolerance;
+    if (s.integrator != Integrator::tolerance) s.tolerance = RenderSettings{}.tolerance;
+    if (s.integrator == Integrator::tolerance) s.step = RenderSettings{}.step;
+    try {
+      validate_integrator(s);
+    } catch (const Error& e) {
+      (integrator != nullptr ? integrator : tolerance)->fail(e.what());
+    }
   }
 
   /// One opacity stands for all isovalues; complaints name the key they are about.
@@ -428,6 +442,12 @@ class Parser {
     if (key == "color_field" && !node.json().is_null()) iso.color_field = node.text();
   }
 
+  static double tolerance_of(const JsonNode& node) {
+    const double tolerance = node.positive_number();
+    if (tolerance > 1) node.fail(fmt::format("{} is more than a channel holds; accepted: a number in (0, 1]", tolerance));
+    return tolerance;
+  }
+
   static void set(RenderPoint& point, const std::string& key, const JsonNode& node) {
     RenderSettings& s = point.settings;
     set_surfaces(s.isosurfaces, key, node);
@@ -442,7 +462,8 @@ class Parser {
     if (key == "slice_target") s.slice_target = located(node, [&] { return parse_slice_target(node.text()); });
     if (key == "level_of_detail" && !node.json().is_null()) s.level_of_detail = node.positive_number();
     if (key == "max_level" && !node.json().is_null()) s.max_level = static_cast<int>(node.integer(0, kMostLevel));
-    if (key == "integrator") point.integrator = node.one_of(kIntegrators);
+    if (key == "integrator") s.integrator = located(node, [&] { return parse_integrator(node.text()); });
+    if (key == "tolerance") s.tolerance = tolerance_of(node);
   }
 
   /// Where the parser of views or transfer functions complains about a combination.
@@ -630,11 +651,12 @@ Json light_json(const PointLight& light) {
 
 Json render_json(const RenderPoint& render) {
   const RenderSettings& s = render.settings;
+  const bool by_tolerance = s.integrator == Integrator::tolerance;
   Json json = {{"consumer", consumer_name(s.consumer)},
                {"mode", mode_name(s.mode)},
                {"sampling", sampling_name(s.sampling)},
-               {"step", s.step},
-               {"integrator", render.integrator},
+               {"step", by_tolerance ? Json() : Json(s.step)},
+               {"integrator", integrator_name(s.integrator)},
                {"width", s.width},
                {"height", s.height},
                {"skip", s.skip},
@@ -644,6 +666,7 @@ Json render_json(const RenderPoint& render) {
                {"transfer_function", nullptr},
                {"transfer_function_name", nullptr}};
   if (s.draws_slices()) json["slice_target"] = slice_target_name(s.slice_target);
+  if (by_tolerance) json["tolerance"] = s.tolerance;
   if (s.draws_surfaces()) json.update(surfaces_json(s.isosurfaces));
   if (s.point_light) json.update(light_json(*s.point_light));
   // only where they are in use, so that the names of other records stay

@@ -37,7 +37,6 @@ struct BuildPoint {
 /// One picture of every structure.
 struct RenderPoint {
   RenderSettings settings;
-  std::string integrator = "exponential_midpoint";
   View view;
   std::string view_name;               ///< as given, or "view 2": its place in the list
   TransferFunction transfer_function;  ///< without points where the mode has no use for it

@@ -161,6 +161,7 @@ constexpr ColumnRule kColumns[] = {
     {"mode", "mode", "", Role::setting, false, value<"/render/mode">},
     {"sampling", "sampling", "", Role::setting, false, value<"/render/sampling">},
     {"step", "step (cells)", "", Role::setting, true, value<"/render/step">},
+    {"tolerance", "tolerance", "", Role::setting, true, value<"/render/tolerance">},
     {"integrator", "integrator", "", Role::setting, false, value<"/render/integrator">},
     {"picture", "picture (pixels)", "", Role::setting, false, picture_cell},
     {"skip", "skip", "", Role::setting, false, value<"/render/skip">},
@@ -191,6 +192,8 @@ constexpr ColumnRule kColumns[] = {
     {"passes", "passes", "", Role::measure, true, value<"/work/passes">},
     {"rmse", "RMSE", "", Role::measure, true, value<"/error/rmse">},
     {"max_error", "max error", "", Role::measure, true, value<"/error/max">},
+    {"p95_error", "95th percentile", "", Role::measure, true, value<"/error/p95">},
+    {"within_tolerance", "within tolerance", "", Role::measure, true, value<"/error/within_tolerance">},
     {"mrse", "MRSE", "", Role::measure, true, value<"/error/mrse">},
     {"psnr", "PSNR (dB)", "", Role::measure, true, value<"/error/psnr_db">},
     {"psnr_common", "PSNR, common (dB)", "", Role::measure, true, value<"/error_common/psnr_db">},
@@ -200,9 +203,9 @@ constexpr ColumnRule kColumns[] = {
 
 /// Measures that a table has unless others are chosen.
 bool is_default(const ColumnRule& rule) {
-  constexpr std::array<std::string_view, 12> on_demand = {"baseline",        "upload",         "rays",         "regions_skipped",
-                                                          "max_error",       "mrse",           "rmse_common",  "pages",
-                                                          "border_overhead", "border_formula", "oversampling", "passes"};
+  constexpr auto on_demand = std::to_array<std::string_view>({"p95_error", "within_tolerance", "baseline", "upload", "rays",
+                                                              "regions_skipped", "max_error", "mrse", "rmse_common", "pages",
+                                                              "border_overhead", "border_formula", "oversampling", "passes"});
   return std::find(on_demand.begin(), on_demand.end(), rule.key) == on_demand.end();
 }
 
@@ -240,7 +243,7 @@ Json order_key(const Json& record) {
   for (const Json& part : {Json(filter_rank(filter)), Json(filter), at(record, "/storage"), at(record, "/filtering")})
     key.push_back(part);
   for (const char* pointer : {"/render/view_name", "/render/transfer_function_name", "/render/consumer", "/render/mode",
-                              "/render/sampling", "/render/step", "/render/width", "/render/height"})
+                              "/render/sampling", "/render/step", "/render/tolerance", "/render/width", "/render/height"})
     key.push_back(at(record, pointer));
   key.push_back(record.dump(-1, ' ', false, Json::error_handler_t::replace));  // ties must not depend on the order of files
   return key;

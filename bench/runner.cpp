@@ -211,6 +211,10 @@ class Runner {
     const ErrorMetrics error = compare(picture, own);
     record["error"] = error_json(error, hash);
     record["error"]["split"] = nullptr;
+    const std::vector<double> pixels = pixel_errors(picture, own);
+    record["error"]["p95"] = percentile(pixels, 0.95);
+    if (scene.settings.integrator == Integrator::tolerance)
+      record["error"]["within_tolerance"] = share_within(pixels, scene.settings.tolerance);
     if (reference.common_filter) {
       FilterDefinition common{*reference.common_filter, 0, mesh_->finest_level()};
       if (common.filter != Filter::linear_page) common.page_level = 0;

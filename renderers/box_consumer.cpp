@@ -30,6 +30,10 @@ const Scene& require_drawable(const Scene& scene, const EncodedField& field) {
   if (s.draws_surfaces())
     refuse(s, fmt::format("mode {} is not drawn: a surface between two boxes needs both sides; accepted are dvr, projection, mip",
                           mode_name(s.mode)));
+  if (s.integrator != Integrator::exponential_midpoint)
+    refuse(s, fmt::format("integrator {} carries samples from box to box; accepted is exponential_midpoint",
+                          integrator_name(s.integrator)));
+  if (s.prunes_levels()) refuse(s, "level_of_detail and max_level are not available");
   if (s.point_light) refuse(s, "point_light is not available: in single passes a secondary ray would leave its box");
   if (s.early_end) refuse(s, "early_end is not available: a box's shader does not know what was drawn before it");
   if (s.slice_target == SliceTarget::rgba8 && !s.draws_slices()) refuse(s, "slice_target rgba8 belongs to slices");

@@ -233,6 +233,44 @@ SliceTarget parse_slice_target(std::string_view name) {
 
 std::string_view sampling_name(Sampling sampling) { return sampling == Sampling::lattice ? "lattice" : "adaptive"; }
 
+std::string_view integrator_name(Integrator integrator) {
+  switch (integrator) {
+    case Integrator::exponential_midpoint:
+      return "exponential_midpoint";
+    case Integrator::euler:
+      return "euler";
+    case Integrator::left:
+      return "left";
+    case Integrator::preintegrated:
+      return "preintegrated";
+    case Integrator::tolerance:
+      return "tolerance";
+  }
+  return "";
+}
+
+Integrator parse_integrator(std::string_view name) {
+  if (name == "midpoint") return Integrator::exponential_midpoint;
+  for (const Integrator integrator :
+       {Integrator::exponential_midpoint, Integrator::euler, Integrator::left, Integrator::preintegrated, Integrator::tolerance})
+    if (name == integrator_name(integrator)) return integrator;
+  throw UsageError(fmt::format(
+      "unknown integrator '{}'; accepted are exponential_midpoint (or midpoint), euler, left, preintegrated, tolerance", name));
+}
+
+void validate_integrator(const RenderSettings& s) {
+  if (s.integrator == Integrator::exponential_midpoint) return;
+  if (s.mode != Mode::dvr)
+    throw UsageError(fmt::format("the mode {} takes the integrator exponential_midpoint alone; {} accepts the mode dvr",
+                                 mode_name(s.mode), integrator_name(s.integrator)));
+  if (s.integrator != Integrator::tolerance) return;
+  if (s.sampling != Sampling::adaptive)
+    throw UsageError("the integrator tolerance chooses its intervals: it accepts the sampling adaptive, not lattice");
+  if (!(s.tolerance > 0 && s.tolerance <= 1))
+    throw UsageError(
+        fmt::format("the tolerance {} is the error asked of a channel of a pixel; it must lie in (0, 1]", s.tolerance));
+}
+
 Mode parse_mode(std::string_view name) {
   for (const Mode mode : {Mode::dvr, Mode::projection, Mode::mip, Mode::iso, Mode::dvr_iso})
     if (name == mode_name(mode)) return mode;
@@ -284,6 +322,9 @@ void validate_light(const RenderSettings& s) {
     throw UsageError(fmt::format("'ambient' is {}; it must lie in [0, 1]", light.ambient));
   if (!(light.shadow_step > 0 && std::isfinite(light.shadow_step)))
     throw UsageError(fmt::format("'shadow_step' is {}; it must be above 0, in cell widths", light.shadow_step));
+  if (s.integrator != Integrator::exponential_midpoint)
+    throw UsageError(
+        fmt::format("'point_light' takes the integrator exponential_midpoint alone, not {}", integrator_name(s.integrator)));
   if (s.draws_volume()) return;
   const bool measures = s.mode == Mode::dvr_iso;
   throw UsageError(fmt::format("'point_light' lights a volume: the modes dvr and dvr_iso (output color) accept it, not {}{}",

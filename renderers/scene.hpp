@@ -77,6 +77,9 @@ enum class Sampling { lattice, adaptive };
 enum class ConsumerKind { raycast, multipass, slices, stencil_slices };
 /// What slices are blended in. Eight bits a channel are the historical control: 256 slices are off by 0.1.
 enum class SliceTarget { rgba32f, rgba8 };
+/// How the light of an interval follows from samples (shaders/README.md, "Integrators"). `euler` and `left` are controls
+/// of order one; `tolerance` chooses its intervals itself.
+enum class Integrator { exponential_midpoint, euler, left, preintegrated, tolerance };
 /// What a picture of isosurfaces holds: colour; world distance from the ray's origin to the first surface,
 /// 0 where there is none; or the unit normal there (the gradient's direction), alpha 1, else all 0.
 enum class Output { color, depth, normal };
@@ -86,6 +89,7 @@ std::string_view mode_name(Mode mode);
 std::string_view sampling_name(Sampling sampling);
 std::string_view consumer_name(ConsumerKind consumer);
 std::string_view slice_target_name(SliceTarget target);
+std::string_view integrator_name(Integrator integrator);
 std::string_view output_name(Output output);
 std::string_view shading_name(Shading shading);
 /// These throw UsageErrors that name the accepted ones.
@@ -93,6 +97,7 @@ Mode parse_mode(std::string_view name);
 Sampling parse_sampling(std::string_view name);
 ConsumerKind parse_consumer(std::string_view name);
 SliceTarget parse_slice_target(std::string_view name);
+Integrator parse_integrator(std::string_view name);
 Output parse_output(std::string_view name);
 Shading parse_shading(std::string_view name);
 
@@ -126,6 +131,8 @@ struct RenderSettings {
   SliceTarget slice_target = SliceTarget::rgba32f;  ///< consumers `slices` and `stencil_slices`
   Mode mode = Mode::dvr;
   Sampling sampling = Sampling::adaptive;
+  Integrator integrator = Integrator::exponential_midpoint;
+  double tolerance = 1e-3;          ///< error asked of every channel of a pixel; integrator `tolerance` alone
   double step = 1;                  ///< cell widths (smallest edge): of the finest level for lattice, of the region for adaptive
   int width = 512;                  ///< pixels
   int height = 512;                 ///< pixels
@@ -147,6 +154,8 @@ struct RenderSettings {
 
 /// Throws UsageError: a lamp whose numbers are none, or in a picture without a volume. Nothing where there is no lamp.
 void validate_light(const RenderSettings& settings);
+/// Throws UsageError where the integrator does not go with the mode, the sampling or the tolerance.
+void validate_integrator(const RenderSettings& settings);
 
 struct Scene {
   View view;

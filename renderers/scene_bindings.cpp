@@ -75,6 +75,50 @@ void add_table(const TransferFunction& tf, double unit, SceneBindings& b) {
   b.buffers.push_back(std::move(table));
 }
 
+/// Shader knots as u_knots in preintegrated.glsl; more stand in a buffer.
+constexpr std::size_t kMostKnots = 34;
+
+/// Both curves' points as one list, and one point beyond all values at each end.
+std::vector<double> knots(const TransferFunction& tf, double unit) {
+  constexpr double kFar = 1e30;
+  std::vector<double> values;
+  for (const auto& p : tf.extinction) values.push_back(p.value);
+  for (const auto& p : tf.color) values.push_back(p.value);
+  std::sort(values.begin(), values.end());
+  // the shader must be able to tell them apart
+  const auto same = [&](double a, double b) { return static_cast<float>(tf.axis(a)) == static_cast<float>(tf.axis(b)); };
+  values.erase(std::unique(values.begin(), values.end(), same), values.end());
+  std::vector<double> numbers;
+  const auto add = [&](double x, double inverse, double value) {
+    const Vec3d rgb = tf.color_at(value);
+    numbers.insert(numbers.end(), {x, inverse, std::min(tf.extinction_at(value) * unit, 1e30), rgb.r, rgb.g, rgb.b});
+  };
+  add(-kFar, 0, values.front());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double x = tf.axis(values[i]);
+    add(x, i + 1 < values.size() ? 1 / (tf.axis(values[i + 1]) - x) : 0, values[i]);
+  }
+  add(kFar, 0, values.back());
+  return numbers;
+}
+
+/// What preintegrated.glsl and tolerance.glsl need; returns AMRTEX_KNOTS.
+int add_knots(const TransferFunction& tf, double unit, SceneBindings& b) {
+  const std::vector<double> numbers = knots(tf, unit);
+  const std::size_t count = numbers.size() / 6;
+  // over log10 a line from a value near 0 would lie at tiny values nearly all of its way: a decade below the first point will do
+  b.uniforms.push_back({"u_knot_lowest", std::vector<double>{tf.logarithmic ? numbers[6] - 1 : -1e30}});
+  if (count <= kMostKnots) {
+    b.uniforms.push_back({"u_knots", numbers});
+    return static_cast<int>(count);
+  }
+  HostTexture buffer = make_buffer("transfer_knots", TexelFormat::r32f, static_cast<int>(numbers.size()));
+  std::transform(numbers.begin(), numbers.end(), buffer.as<float>(), [](double v) { return static_cast<float>(v); });
+  b.uniforms.push_back({"u_knot_count", std::vector<int>{static_cast<int>(count)}});
+  b.buffers.push_back(std::move(buffer));
+  return 0;
+}
+
 /// Intervals of values without extinction, first and last value of each; a little inside of
 /// the true ones, by what the shader's own evaluation may be off (`margin`, on the axis).
 std::vector<double> invisible_ranges(const TransferFunction& tf, double margin) {
@@ -207,6 +251,37 @@ std::vector<double> value_scales(const EncodedField& field) {
   return scales;
 }
 
+/// Extinction per unit of ray length of an extinction of 1.
+double extinction_unit(const AmrHierarchy& h, const Scene& scene) {
+  const Vec3d size = h.domain_upper() - h.domain_lower();
+  const bool world = scene.transfer_function.length_unit == TransferFunction::LengthUnit::world;
+  return world ? smallest_edge(h) : smallest_edge(h) / std::max({size.x, size.y, size.z});
+}
+
+/// Longest interval that `tolerance` tries, in cell widths of the region.
+constexpr double kLongestInterval = 8;
+/// Error that one interval may have: a smaller tolerance needs more of them, so each gets a smaller part. Errors of
+/// intervals cancel in part, and corrected ones are smaller than estimated; the factor is measured (experiments/tolerance).
+double interval_error(double tolerance) { return 1.2 * std::pow(tolerance, 1.25); }
+/// Part of the tolerance that a ray may leave behind it.
+constexpr double kToleranceLeft = 0.1;
+
+void add_integrator(const Scene& scene, const EncodedField& field, double unit, SceneBindings& b) {
+  const RenderSettings& s = scene.settings;
+  validate_integrator(s);
+  b.defines.emplace_back("AMRTEX_INTEGRATOR", static_cast<int>(s.integrator));
+  const bool by_tolerance = s.integrator == Integrator::tolerance;
+  if (by_tolerance || s.integrator == Integrator::preintegrated)
+    b.defines.emplace_back("AMRTEX_KNOTS", add_knots(scene.transfer_function, unit, b));
+  if (!by_tolerance) return;
+  if (field.definition.filter == Filter::nearest)
+    throw UnsupportedError(
+        "integrator tolerance: the filter nearest jumps from cell to cell, which no interval follows; accepted "
+        "are linear_lod, linear_page, linear_vertex, basis");
+  b.uniforms.push_back({"u_interval_error", std::vector<double>{interval_error(s.tolerance)}});
+  b.uniforms.push_back({"u_longest", std::vector<double>{kLongestInterval}});
+}
+
 }  // namespace
 
 FinestCamera finest_camera(const AmrHierarchy& h, const Scene& scene) {
@@ -250,15 +325,15 @@ UniformValues field_uniforms(const AmrHierarchy& h, const EncodedField& field) {
 SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const Scene& scene) {
   const RenderSettings& s = scene.settings;
   const double unit = smallest_edge(h);
-  const Vec3d size = h.domain_upper() - h.domain_lower();
-  const double longest = std::max({size.x, size.y, size.z});
   SceneBindings b;
   b.uniforms = field_uniforms(h, field);
   add_camera(h, scene, b.uniforms);
   require_detail(field, s);
   if (s.prunes_levels()) add_detail(h, scene, b.uniforms);
   b.uniforms.push_back({"u_step", std::vector<double>{s.step}});
-  b.uniforms.push_back({"u_early_end", std::vector<double>{1 - s.early_end.value_or(1)}});
+  const bool by_tolerance = s.integrator == Integrator::tolerance;
+  const double least = by_tolerance ? kToleranceLeft * s.tolerance : 0;
+  b.uniforms.push_back({"u_early_end", std::vector<double>{std::max(1 - s.early_end.value_or(1), least)}});
   b.uniforms.push_back({"u_length_unit", std::vector<double>{unit}});
   // modes without a transfer function declare points of which nothing is read
   int extinction_points = 1;
@@ -266,7 +341,7 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
   int invisible_count = 0;
   if (s.draws_volume()) {
     const TransferFunction& tf = scene.transfer_function;
-    const double per_unit = tf.length_unit == TransferFunction::LengthUnit::world ? unit : unit / longest;
+    const double per_unit = extinction_unit(h, scene);
     b.transfer_exact = std::max(tf.extinction.size(), tf.color.size()) <= kMostPoints;
     if (b.transfer_exact) {
       add_points(tf, per_unit, b.uniforms);
@@ -292,10 +367,11 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
                {"AMRTEX_MODE", static_cast<int>(shader_mode(s))},
                {"AMRTEX_LATTICE", s.sampling == Sampling::lattice ? 1 : 0},
                {"AMRTEX_SKIP", s.skip ? 1 : 0},
-               {"AMRTEX_EARLY_END", s.early_end && s.draws_volume() ? 1 : 0},
+               {"AMRTEX_EARLY_END", (s.early_end || by_tolerance) && s.draws_volume() ? 1 : 0},
                {"AMRTEX_ISOVALUES", s.draws_surfaces() ? static_cast<int>(s.isosurfaces.values.size()) : 0}};
   add_light(h, s, b);
   if (s.draws_surfaces()) add_surfaces(scene, field, b);
+  add_integrator(scene, field, extinction_unit(h, scene), b);
   return b;
 }
 

@@ -58,8 +58,10 @@ void march_lattice_box(IN(Ray) ray, IN(Region) r, INOUT(Accumulation) a) {
   }
   if (ray_real(u_step) * ray_real(whole) < ray.length) {
     Position p;
-    LatticeBlock rest = lattice_rest(ray, whole, p);
-    if (region_contains(r, p.cell)) take_lattice_rest(a, ray, rest, r);
+    ray_real start = ray_real(u_step) * ray_real(whole);
+    ray_real middle = (start + ray.length) * ray_real(0.5);
+    LatticeBlock rest = lattice_point(ray, whole, middle, p);
+    if (region_contains(r, p.cell)) take_lattice_point(a, rest, r, start, middle, real(ray.length - start));
   }
 }
 

@@ -428,11 +428,26 @@ TEST_F(CommandLine, AnIsovalueOutsideTheRangeIsAnEmptyPictureAndAWarning) {
   EXPECT_EQ(*std::max_element(picture.values.begin(), picture.values.end()), 0);
 }
 
+TEST_F(CommandLine, RenderReachesTheErrorThatItIsAskedFor) {
+  Json json = with(one_point(), "render", {{"sampling", "adaptive"}, {"width", 24}, {"height", 24}});
+  json["filters"] = {"linear_page"};
+  const std::string scene = experiment_file(json);
+  EXPECT_EQ(amrtex({"render", scene, "-o", at("a.npy"), "--tolerance", "1e-3"}).exit_code, 0);
+  EXPECT_EQ(amrtex({"render", scene, "-o", at("r.npy"), "--reference"}).exit_code, 0);
+  EXPECT_GE(share_within(pixel_errors(read_npy(at("a.npy")), read_npy(at("r.npy"))), 1e-3), 0.95);
+}
+
 TEST_F(CommandLine, RenderRefusesWhatIsNoSceneOrNoPicture) {
   const std::string axes = experiment_file(small_experiment());
   expect_complaint(amrtex({"render", axes, "-o", at("a.png")}), 2, HasSubstr("encodings"));
   const std::string scene = experiment_file(one_point());
   expect_complaint(amrtex({"render", scene, "-o", at("a.tif")}), 2, AllOf(HasSubstr(".png"), HasSubstr(".npy")));
+  expect_complaint(amrtex({"render", scene, "-o", at("a.png"), "--tolerance", "1e-3"}), 2,
+                   AllOf(HasSubstr("--tolerance"), HasSubstr("adaptive, not lattice")));
+  const std::string adaptive =
+      experiment_file(with(one_point(), "render", {{"sampling", "adaptive"}, {"width", 8}, {"height", 8}}));
+  expect_complaint(amrtex({"render", adaptive, "-o", at("a.png"), "--tolerance", "0"}), 2,
+                   AllOf(HasSubstr("--tolerance"), HasSubstr("(0, 1]")));
   expect_complaint(amrtex({"render", scene, "-o", at("a.png"), "--memory-limit", "much"}), 2, HasSubstr("512MiB"));
   expect_complaint(amrtex({"render", scene, "-o", at("a.png"), "--memory-limit", "1KiB"}), 1, HasSubstr("bytes"));
   write_text(at("file"), "x");

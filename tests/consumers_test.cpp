@@ -442,6 +442,9 @@ TEST(BoxConsumers, RefuseByNameWhatTheyCannotDraw) {
   scene.settings.isosurfaces.values = {0.5};
   EXPECT_NE(refusal(scene).find("consumer multipass: mode iso"), std::string::npos) << refusal(scene);
   scene = plain;
+  scene.settings.integrator = Integrator::preintegrated;
+  EXPECT_NE(refusal(scene).find("consumer slices: integrator preintegrated"), std::string::npos) << refusal(scene);
+  scene.settings.integrator = Integrator::exponential_midpoint;
   scene.settings.point_light.emplace();
   EXPECT_NE(refusal(scene).find("consumer slices: point_light"), std::string::npos) << refusal(scene);
   scene.settings.point_light.reset();

@@ -164,6 +164,23 @@ TEST(Experiment, ConsumersAreAnAxisAndOnlySlicesHaveATarget) {
                                   "stencil_slices rgba8"));
 }
 
+TEST(Experiment, AToleranceStandsForTheIntegratorThatKnowsItAndHasNoStep) {
+  const auto renders = [](const char* render) { return parsed(with("render", render)).renders; };
+  EXPECT_EQ(renders("{}")[0].settings.integrator, Integrator::exponential_midpoint);
+  EXPECT_EQ(renders(R"({"integrator": "midpoint"})")[0].settings.integrator, Integrator::exponential_midpoint);
+  const auto asked = renders(R"({"tolerance": [1e-2, 1e-3], "step": [1, 0.5]})");
+  ASSERT_EQ(asked.size(), 2u);
+  EXPECT_EQ(asked[1].settings.integrator, Integrator::tolerance);
+  EXPECT_EQ(asked[1].settings.tolerance, 1e-3);
+  EXPECT_EQ(render_json(asked[1])["tolerance"], 1e-3);
+  EXPECT_TRUE(render_json(asked[1])["step"].is_null());
+  // the others have no tolerance: 2 steps and 2 tolerances, not 4 and 4
+  const auto both = renders(R"({"integrator": ["euler", "tolerance"], "tolerance": [1e-2, 1e-3], "step": [1, 0.5]})");
+  ASSERT_EQ(both.size(), 4u);
+  EXPECT_EQ(render_json(both[0])["integrator"], "euler");
+  EXPECT_FALSE(render_json(both[0]).contains("tolerance"));
+}
+
 TEST(Experiment, ValuesThatAreListsBecomeAxesAsListsOfLists) {
   Json json = Json::parse(kSmall);
   json["views"][0]["eye"] = Json::parse("[[3, 0, 0], [0, 3, 0]]");
@@ -355,7 +372,6 @@ TEST(ExperimentErrors, NameKeyAndWhatIsAccepted) {
       {"render", R"({"early_end": 2})", "render.early_end:", "from 0 to 1"},
       {"render", R"({"consumer": "splats"})", "render.consumer:", "raycast, multipass, slices, stencil_slices"},
       {"render", R"({"consumer": "slices", "slice_target": "rgba16f"})", "render.slice_target:", "rgba32f, rgba8"},
-      {"render", R"({"integrator": "euler"})", "render.integrator:", "exponential_midpoint"},
       {"render", R"({"point_light": [1, 2]})", "render.point_light:", "three numbers [x, y, z]"},
       {"render", R"({"point_light": 5})", "render.point_light:", "three numbers [x, y, z]"},
       {"render", R"({"point_light": [1, 2, "x"]})", "render.point_light[2]:", "number"},
@@ -363,9 +379,20 @@ TEST(ExperimentErrors, NameKeyAndWhatIsAccepted) {
       {"render", R"({"point_light": [1, 2, 3], "shadow_step": 0})", "render.shadow_step:", "above 0"},
       {"render", R"({"ambient": 0.5})", "render.ambient:", "'point_light'"},
       {"render", R"({"shadow_step": 2})", "render.shadow_step:", "'point_light'"},
+      {"render", R"({"integrator": "euler", "point_light": [1, 2, 3]})", "render.point_light:", "not euler"},
       {"render", R"({"mode": "mip", "point_light": [1, 2, 3]})", "render.point_light:", "dvr and dvr_iso"},
       {"render", R"({"mode": "iso", "isovalues": [1], "point_light": [1, 2, 3]})", "render.point_light:", "not iso"},
-      {"render", R"({"tolerance": 1})", "render.tolerance: not available in this version", "mode, sampling"},
+      {"render", R"({"integrator": "simpson"})", "render.integrator:", "midpoint), euler, left, preintegrated, tolerance"},
+      {"render", R"({"mode": ["dvr", "projection"], "integrator": "euler"})", "render.integrator:", "accepts the mode dvr"},
+      {"render", R"({"mode": "mip", "integrator": "preintegrated"})", "render.integrator:", "accepts the mode dvr"},
+      {"render", R"({"mode": "projection", "tolerance": 0.1})", "render.tolerance:", "accepts the mode dvr"},
+      {"render", R"({"mode": "dvr_iso", "isovalues": [1], "integrator": "left"})", "render.integrator:", "accepts the mode dvr"},
+      {"render", R"({"sampling": "lattice", "integrator": "tolerance"})", "render.integrator:", "the sampling adaptive"},
+      {"render", R"({"sampling": "lattice", "tolerance": 0.001})", "render.tolerance:", "the sampling adaptive"},
+      {"render", R"({"tolerance": 0})", "render.tolerance:", "above 0"},
+      {"render", R"({"tolerance": [0.1, -0.1]})", "render.tolerance[1]:", "above 0"},
+      {"render", R"({"tolerance": 2})", "render.tolerance:", "(0, 1]"},
+      {"render", R"({"tolerance": "NaN"})", "render.tolerance:", "above 0"},
       {"render", R"({"prune": true})", "render.prune: not available in this version", "early_end"},
       {"render", R"({"level_of_detail": 0})", "render.level_of_detail:", "above 0"},
       {"render", R"({"level_of_detail": "pixel"})", "render.level_of_detail:", "above 0"},
