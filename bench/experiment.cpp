@@ -98,9 +98,9 @@ class Parser {
 
  private:
   void accept_root_keys() const {
-    Names keys = {"name",      "datasets", "encodings",         "filters", "storage", "filtering",
-                  "render",    "views",    "transfer_function", "frames",  "warm_up", "seed",
-                  "reference", "context",  "memory_limit",      "check",   "baseline"};
+    Names keys = {"name",      "datasets", "encodings",         "filters", "storage",  "filtering",
+                  "render",    "views",    "transfer_function", "frames",  "warm_up",  "seed",
+                  "reference", "context",  "memory_limit",      "check",   "baseline", "explain_error"};
     if (scene_) keys.push_back("region");
     root_.accept_keys(keys);
   }
@@ -521,6 +521,11 @@ class Parser {
       experiment_.minimum_psnr_db = check->require("psnr_db").number(0, 1000);
     }
     if (const auto baseline = root_.find("baseline")) experiment_.baseline = baseline->boolean();
+    if (const auto explain = root_.find("explain_error")) {
+      experiment_.explain_error = explain->boolean();
+      if (experiment_.explain_error && !experiment_.reference)
+        explain->fail("a picture without a reference has no error to explain");
+    }
     if (const auto region = root_.find("region")) parse_region(*region);
   }
 
@@ -631,6 +636,7 @@ Json point_configuration(const Experiment& experiment, const BuildPoint& build, 
   if (experiment.reference) {
     const auto& common = experiment.reference->common_filter;
     reference = {{"step", experiment.reference->step}, {"filter", common ? filter_name(*common) : "own"}};
+    if (experiment.explain_error) reference["explain"] = true;  // absent elsewhere: older records keep their names
   }
   return {{"experiment", experiment.name},
           {"dataset", dataset_hash},

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "bench/environment.hpp"
+#include "bench/error_split.hpp"
 #include "bench/image_error.hpp"
 #include "bench/record.hpp"
 #include "bench/statistics.hpp"
@@ -35,6 +36,7 @@ class Stopwatch {
 
 /// A structure on the context, with what was measured on the way there.
 struct Built {
+  BuildRequest request;
   EncodedField field;
   std::unique_ptr<GpuField> gpu;
   double build_seconds = 0;
@@ -153,6 +155,7 @@ class Runner {
     if (const Support support = encoding.supported(request.context); !support.ok)
       throw UnsupportedError(fmt::format("encoding {}: {}", build.encoding, support.reason));
     auto built = std::make_unique<Built>();
+    built->request = request;
     const Stopwatch building;
     built->field = encoding.build(*mesh_, request);
     built->build_seconds = building.seconds();
@@ -179,7 +182,7 @@ class Runner {
     for (const std::string& text : scene_warnings(*mesh_, scene)) warn(record, text);
     if (!raycaster.transfer_exact())
       warn(record, "the transfer function has more than 16 points: it is drawn from a table of 4096 bins");
-    if (!add_errors(record, picture, built.field, scene)) {
+    if (!add_errors(record, picture, built, scene)) {
       write(build, render, record);
       return;  // a wrong picture gets no time
     }
@@ -194,15 +197,15 @@ class Runner {
   static void warn(Json& record, const std::string& text) { record["context"]["warnings"].push_back(text); }
 
   /// False when the picture is wrong.
-  bool add_errors(Json& record, const Picture& picture, const EncodedField& field, const Scene& scene) {
+  bool add_errors(Json& record, const Picture& picture, const Built& built, const Scene& scene) {
     if (!experiment_.reference) return true;
     const ReferenceSettings& reference = *experiment_.reference;
     const fs::path cache = options_.folder / "references";
     std::string hash;
-    const Picture own = cached_reference(*mesh_, field.definition, scene, reference.step, cache, hash);
+    const Picture own = cached_reference(*mesh_, built.field.definition, scene, reference.step, cache, hash);
     const ErrorMetrics error = compare(picture, own);
     record["error"] = error_json(error, hash);
-    record["error"]["split"] = nullptr;
+    record["error"]["split"] = experiment_.explain_error ? explain(built, scene, own, picture) : Json();
     if (reference.common_filter) {
       FilterDefinition common{*reference.common_filter, 0, mesh_->finest_level()};
       if (common.filter != Filter::linear_page) common.page_level = 0;
@@ -217,6 +220,15 @@ class Runner {
       return false;
     }
     return true;
+  }
+
+  /// The error by cause.
+  Json explain(const Built& built, const Scene& scene, const Picture& reference, const Picture& picture) {
+    const auto truth = analytic_field(experiment_.datasets[loaded_]);
+    const double step = experiment_.reference->step;
+    const Encoding& encoding = find_encoding(built.field.encoding);
+    return split_json(split_error(
+        {*mesh_, encoding, built.request, built.field, *built.gpu, *context_, scene, reference, picture, step, truth.get()}));
   }
 
   void add_times(Json& record, const BuildPoint& build, const RenderPoint& render, Raycaster& raycaster) {
@@ -365,6 +377,10 @@ AmrHierarchy load_dataset(const Experiment& experiment, const DatasetSource& sou
     }
   }
   return AmrHierarchy(read_mesh(*source.file, fields));
+}
+
+std::unique_ptr<AnalyticField> analytic_field(const DatasetSource& source) {
+  return source.file ? nullptr : make_analytic_field(source.generate);
 }
 
 std::vector<int> more_fields(const AmrHierarchy& hierarchy, const Scene& scene) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "renderers/cpu_field.hpp"
 #include "renderers/draw_target.hpp"
 #include "renderers/gpu_field.hpp"
 #include "renderers/gpu_timer.hpp"
@@ -54,5 +55,7 @@ class Raycaster {
 
 /// The same text on the CPU, all cores.
 Picture render_on_cpu(const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene, bool double_precision);
+/// The same with a CPU build of one's own.
+Picture trace_on_cpu(CpuField& cpu, const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene);
 
 }  // namespace amrtex

@@ -449,5 +449,21 @@ TEST(Suggestion, OnlyNamesWhatIsNear) {
   EXPECT_EQ(suggestion("colour", names), "");
 }
 
+TEST(ExplainError, IsOffUnlessAskedForAndNamesTheRecordOnlyThen) {
+  const Experiment plain = parsed(kSmall);
+  const Experiment explained = parsed(with("explain_error", "true"));
+  EXPECT_FALSE(plain.explain_error);
+  EXPECT_TRUE(explained.explain_error);
+  const auto hash = [](const Experiment& e) {
+    return configuration_hash(point_configuration(e, e.builds.front(), e.renders.front(), "mesh"));
+  };
+  EXPECT_EQ(hash(plain), hash(parsed(with("explain_error", "false"))));
+  EXPECT_NE(hash(plain), hash(explained));
+  EXPECT_THAT(complaint(with("explain_error", "1")), HasSubstr("explain_error"));
+  Json both = Json::parse(with("explain_error", "true"));
+  both["reference"] = nullptr;
+  EXPECT_THAT(complaint(both.dump()), HasSubstr("no error to explain"));
+}
+
 }  // namespace
 }  // namespace amrtex
