@@ -16,6 +16,7 @@ struct Arguments {
   bool reference = false;
   bool color_bar = false;
   bool explain_error = false;
+  bool prune = false;
   bool json = false;
   double reference_step = 0;
 };
@@ -89,7 +90,8 @@ int run(const Arguments& a) {
   const Experiment scene = read_scene(a.scene);
   const BuildPoint& build = scene.builds.front();
   const AmrHierarchy mesh = load_dataset(scene, scene.datasets[build.dataset]);
-  const Scene drawn = scene_of(scene, scene.renders.front());
+  Scene drawn = scene_of(scene, scene.renders.front());
+  drawn.settings.prune = drawn.settings.prune || a.prune;
   const auto context = make_context(parse_context_kind(a.context.empty() ? scene.context : a.context));
   BuildRequest request;
   request.storage = build.storage;
@@ -136,6 +138,7 @@ void add_render_command(CLI::App& app, Command& chosen) {
   c->add_option("--reference-step", a->reference_step, "its step, in widths of the finest cells");
   c->add_flag("--explain-error", a->explain_error, "print the picture's error by cause");
   c->add_flag("--json", a->json, "of --explain-error, for programs");
+  c->add_flag("--prune", a->prune, "build nothing that the transfer function hides (mode dvr)");
   c->add_flag("--color-bar", a->color_bar, "a bar with the range, for the modes projection and mip");
   c->footer("Example: amrtex render experiments/limits/scene.json -o picture.png");
   c->callback([a, &chosen] { chosen = [a] { return run(*a); }; });

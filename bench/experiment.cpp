@@ -23,10 +23,11 @@ constexpr int kMaxPictureEdge = 16384;
 constexpr int kMaxFrames = 1000000;
 constexpr double kAnyNumber = std::numeric_limits<double>::max();
 
-constexpr std::array<std::string_view, 16> kAvailableRenderKeys = {
-    "mode",       "sampling",  "step",        "width",         "height",        "skip",    "early_end", "consumer",
-    "integrator", "isovalues", "iso_opacity", "surface_color", "iso_tolerance", "shading", "output",    "color_field"};
-constexpr std::array<std::string_view, 4> kLaterRenderKeys = {"tolerance", "prune", "level_of_detail", "clip_planes"};
+constexpr std::array<std::string_view, 18> kAvailableRenderKeys = {
+    "mode",      "sampling",    "step",          "width",         "height",  "skip",   "early_end",   "consumer", "integrator",
+    "isovalues", "iso_opacity", "surface_color", "iso_tolerance", "shading", "output", "color_field", "prune",    "needs"};
+constexpr std::array<std::string_view, 3> kLaterRenderKeys = {"tolerance", "level_of_detail", "clip_planes"};
+constexpr std::array<std::string_view, 2> kNeeds = {"scene", "all"};
 constexpr std::array<std::string_view, 1> kConsumers = {"raycast"};
 constexpr std::array<std::string_view, 1> kIntegrators = {"exponential_midpoint"};
 constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
@@ -77,6 +78,8 @@ Json unnamed_render_json(const RenderPoint& render) {
   Json json = render_json(render);
   json.erase("view_name");
   json.erase("transfer_function_name");
+  if (!render.settings.prune) json.erase("prune");  // older records keep their names
+  if (!render.settings.everything) json.erase("needs");
   return json;
 }
 
@@ -303,6 +306,10 @@ class Parser {
     const std::vector<RenderPoint> settings = parse_settings();
     const std::vector<RenderPoint> views = parse_views();
     const std::vector<RenderPoint> functions = parse_transfer_functions();
+    for (const RenderPoint& point : settings)
+      if (point.settings.prune && functions.size() > 1)
+        root_.find("transfer_function")
+            ->fail("with 'prune' the transfer function may not change: what one hides another may show; accepted: one");
     for (const RenderPoint& view : views)
       for (const RenderPoint& function : functions)
         for (RenderPoint render : settings) {
@@ -356,12 +363,20 @@ class Parser {
   static RenderPoint parse_setting(const Choice& choice) {
     RenderPoint point;
     for (const auto& [key, node] : choice) set(point, key, node);
+    if (point.settings.prune) require_prunable(point.settings, *find(choice, "prune"));
     if (!point.settings.draws_volume()) point.settings.early_end.reset();  // no opacity to end at
     if (point.settings.draws_surfaces())
       finish_surfaces(point.settings.isosurfaces, choice);
     else
       point.settings.isosurfaces = {};  // other modes have no use for it
     return point;
+  }
+
+  /// What is not built cannot be seen later.
+  static void require_prunable(const RenderSettings& s, const JsonNode& prune) {
+    if (s.mode != Mode::dvr)
+      prune.fail(fmt::format("in mode {} the transfer function hides nothing for good; accepted: mode dvr", mode_name(s.mode)));
+    if (s.everything) prune.fail("needs 'all' keeps what pruning leaves out; accepted: one of both");
   }
 
   /// One opacity stands for all isovalues; complaints name the key they are about.
@@ -417,6 +432,8 @@ class Parser {
     if (key == "width") s.width = static_cast<int>(node.integer(1, kMaxPictureEdge));
     if (key == "height") s.height = static_cast<int>(node.integer(1, kMaxPictureEdge));
     if (key == "skip") s.skip = node.boolean();
+    if (key == "prune") s.prune = node.boolean();
+    if (key == "needs") s.everything = node.one_of(kNeeds) == "all";
     if (key == "early_end" && !node.json().is_null()) s.early_end = node.number(0, 1);
     if (key == "consumer") point.consumer = node.one_of(kConsumers);
     if (key == "integrator") point.integrator = node.one_of(kIntegrators);
@@ -615,6 +632,8 @@ Json render_json(const RenderPoint& render) {
                {"width", s.width},
                {"height", s.height},
                {"skip", s.skip},
+               {"prune", s.prune},
+               {"needs", s.everything ? "all" : "scene"},
                {"early_end", json_or_null(s.early_end)},
                {"view", to_json(render.view)},
                {"view_name", render.view_name},

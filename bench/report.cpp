@@ -118,6 +118,15 @@ Cell status_cell(const Json& record, const Group&) {
   return reason.empty() ? status : fmt::format("{}: {}", status, reason);
 }
 
+/// What was left out for want of need, and because it is hidden.
+Cell left_out_cell(const Json& record, const Group&) {
+  const Json& list = at(record, "/left_out");
+  if (!list.is_array()) return std::monostate();
+  double bytes = 0;
+  for (const Json& item : list) bytes += item.at("bytes").get<double>();
+  return bytes / kMebibyte;
+}
+
 bool is_linear(const Json& record) { return text_of(at(record, "/filter")) != "nearest"; }
 
 bool same(const Json& a, const Json& b, const char* pointer) { return at(a, pointer) == at(b, pointer); }
@@ -163,6 +172,8 @@ constexpr ColumnRule kColumns[] = {
     {"integrator", "integrator", "", Role::setting, false, value<"/render/integrator">},
     {"picture", "picture (pixels)", "", Role::setting, false, picture_cell},
     {"skip", "skip", "", Role::setting, false, value<"/render/skip">},
+    {"needs", "needs", "", Role::setting, false, value<"/render/needs">},
+    {"prune", "prune", "", Role::setting, false, value<"/render/prune">},
     {"early_end", "early end (opacity)", "", Role::setting, true, value<"/render/early_end">},
     {"view", "view", "", Role::setting, false, named<"/render/view_name", "/render/view">},
     {"transfer_function", "transfer function", "", Role::setting, false,
@@ -173,6 +184,7 @@ constexpr ColumnRule kColumns[] = {
     {"topology", "topology (MiB)", "", Role::measure, true, mebibytes<"/memory/by_role/topology">},
     {"padding", "padding (MiB)", "", Role::measure, true, mebibytes<"/memory/by_role/padding">},
     {"texels_per_cell", "texels per cell", "", Role::measure, true, value<"/memory/texels_per_cell">},
+    {"left_out", "left out (MiB)", "", Role::measure, true, left_out_cell},
     {"build", "build (s)", "", Role::measure, true, value<"/build_seconds">},
     {"upload", "upload (s)", "", Role::measure, true, value<"/upload_seconds">},
     {"wall", "frame wall (ms)", "", Role::measure, true, timing<"/frame/wall_ms">},
@@ -211,9 +223,9 @@ bool is_split(const ColumnRule& rule) { return std::string_view(rule.key).starts
 /// Measures that a table has unless others are chosen.
 bool is_default(const ColumnRule& rule) {
   if (is_split(rule)) return false;
-  constexpr std::array<std::string_view, 11> on_demand = {"baseline",        "upload",         "rays",        "regions_skipped",
-                                                          "max_error",       "mrse",           "rmse_common", "pages",
-                                                          "border_overhead", "border_formula", "oversampling"};
+  constexpr std::array<std::string_view, 12> on_demand = {"left_out",        "baseline",        "upload",         "rays",
+                                                          "regions_skipped", "max_error",       "mrse",           "rmse_common",
+                                                          "pages",           "border_overhead", "border_formula", "oversampling"};
   return std::find(on_demand.begin(), on_demand.end(), rule.key) == on_demand.end();
 }
 

@@ -121,7 +121,7 @@ class Runner {
   void measure_all(const BuildPoint& build, const std::vector<const RenderPoint*>& renders) {
     std::unique_ptr<Built> built;
     try {
-      built = make(build, renders.front()->settings);
+      built = make(build, scene_of(experiment_, *renders.front()));
     } catch (const UsageError&) {
       throw;  // a bad parameter concerns the whole experiment
     } catch (const std::exception& error) {
@@ -141,14 +141,12 @@ class Runner {
     }
   }
 
-  std::unique_ptr<Built> make(const BuildPoint& build, const RenderSettings& settings) {
+  std::unique_ptr<Built> make(const BuildPoint& build, const Scene& scene) {
     BuildRequest request;
     request.storage = build.storage;
     request.parameters = build.parameters;
     request.context = context_->info();
     request.memory_limit = experiment_.memory_limit.value_or(request.memory_limit);
-    Scene scene;
-    scene.settings = settings;
     request.needs = scene_needs(scene, build.filter, build.filtering);
     request.more_fields = more_fields(*mesh_, scene);
     const Encoding& encoding = find_encoding(build.encoding);
@@ -284,7 +282,7 @@ class Runner {
     settings.transfer_function = render.transfer_function;
     settings.transfer_function_name = render.transfer_function_name;
     const std::string key = render_json(settings).dump();
-    if (!baseline_) baseline_ = make(*first, settings.settings);
+    if (!baseline_) baseline_ = make(*first, scene_of(experiment_, settings));
     if (!baseline_caster_ || key != baseline_key_) {
       baseline_caster_ =
           std::make_unique<Raycaster>(*context_, *mesh_, baseline_->field, *baseline_->gpu, scene_of(experiment_, settings));

@@ -1,6 +1,7 @@
 // The C++ side of the sampler contract: what an encoding is to everybody else.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -58,6 +59,10 @@ struct SceneNeeds {
   Filtering filtering = Filtering::manual;
   bool value_ranges = true;  ///< regions are skipped by their value range
   bool gradients = false;    ///< surfaces are lit: stored gradients are of use where an encoding has room for them
+  bool everything = false;   ///< nothing is left out for want of need: what leaving out saves is measured against this
+  /// First and last value of intervals without extinction, ascending (renderers/scene_bindings.hpp): parts of the structure whose
+  /// values lie in one of them are left out. Empty: all are kept.
+  std::vector<std::array<double, 2>> invisible = {};
   bool operator==(const SceneNeeds&) const = default;
 };
 
@@ -135,6 +140,8 @@ class Encoding {
   /// Throws UsageError for values that no mesh would make acceptable. `parameters` is complete.
   virtual void check_parameters(const Json& parameters) const = 0;
   virtual Support supported(const ContextInfo& context) const = 0;
+  /// Can parts that the transfer function hides be left out (SceneNeeds::invisible)? Others refuse to be asked.
+  virtual bool prunes() const { return false; }
   /// Builds the field. Throws UsageError for a bad parameter, UnsupportedError for
   /// a filter or a size that this encoding cannot take (naming what it can), and
   /// BudgetError before allocation when the result would pass the limits.
@@ -150,7 +157,8 @@ const Encoding& find_encoding(std::string_view name);
 Json complete_parameters(const Encoding& encoding, const Json& given);
 /// Throws UnsupportedError naming the filters that the encoding has.
 void require_filter(const Encoding& encoding, Filter filter);
-/// Throws UsageError that says how many fields are supported, or which index the mesh does not have.
+/// Throws UsageError that says how many fields are supported, or which index the mesh does not have, and
+/// UnsupportedError where parts are to be left out and the encoding has none that could be.
 void require_fields(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request);
 /// Throws BudgetError with the bytes needed when `bytes` passes the limit.
 void require_budget(const Encoding& encoding, std::int64_t bytes, const BuildRequest& request);

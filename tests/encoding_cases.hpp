@@ -41,6 +41,8 @@ struct BuildOptions {
   bool value_ranges = true;
   int field = 0;
   std::vector<int> more_fields = {};
+  bool everything = false;
+  std::vector<std::array<double, 2>> invisible = {};
 };
 
 /// Throws UnsupportedError for a mesh or combination that the encoding refuses.
@@ -52,6 +54,8 @@ inline EncodedField build(const AmrHierarchy& h, const EncodingCase& c, const Bu
   request.needs.filter = c.filter;
   request.needs.filtering = options.filtering;
   request.needs.value_ranges = options.value_ranges;
+  request.needs.everything = options.everything;
+  request.needs.invisible = options.invisible;
   request.parameters = c.parameters;
   return c.encoding->build(h, request);
 }

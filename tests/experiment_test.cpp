@@ -344,7 +344,9 @@ TEST(ExperimentErrors, NameKeyAndWhatIsAccepted) {
       {"render", R"({"consumer": "slices"})", "render.consumer:", "raycast"},
       {"render", R"({"integrator": "euler"})", "render.integrator:", "exponential_midpoint"},
       {"render", R"({"tolerance": 1})", "render.tolerance: not available in this version", "mode, sampling"},
-      {"render", R"({"prune": true})", "render.prune: not available in this version", "early_end"},
+      {"render", R"({"mode": "projection", "prune": true})", "render.prune: in mode projection", "dvr"},
+      {"render", R"({"prune": true, "needs": "all"})", "render.prune: needs 'all' keeps", "one of both"},
+      {"render", R"({"needs": "some"})", "render.needs", "scene, all"},
       {"render", R"({"level_of_detail": 1})", "render.level_of_detail: not available in this version", "early_end"},
       {"render", R"({"clip_planes": [[1, 0, 0, 0]]})", "render.clip_planes: not available in this version", "early_end"},
       {"render", R"({"widht": 4})", "render.widht:", "did you mean 'width'?"},
@@ -447,6 +449,29 @@ TEST(Suggestion, OnlyNamesWhatIsNear) {
   const std::vector<std::string_view> names = {"width", "height"};
   EXPECT_EQ(suggestion("widht", names), "; did you mean 'width'?");
   EXPECT_EQ(suggestion("colour", names), "");
+}
+
+TEST(Prune, IsRefusedWhereTheTransferFunctionWillChange) {
+  Json json = Json::parse(with("render", R"({"mode": "dvr", "prune": true})"));
+  EXPECT_EQ(complaint(json.dump()), "accepted");
+  const Json one = json["transfer_function"];
+  Json other = one;
+  other["extinction"] = {{0.5, 0}, {1, 5}};
+  json["transfer_function"] = {one, other};
+  EXPECT_THAT(complaint(json.dump()), AllOf(HasSubstr("transfer_function"), HasSubstr("prune")));
+  json["transfer_function"] = one;
+  json["transfer_function"]["extinction"] = {{{0, 0}, {1, 5}}, {{0.5, 0}, {1, 5}}};
+  EXPECT_THAT(complaint(json.dump()), HasSubstr("prune"));
+}
+
+TEST(Prune, AndNeedsNameTheRecordOnlyWhereTheyAreNotTheDefault) {
+  const auto hash = [](const std::string& render) {
+    const Experiment e = parsed(with("render", render));
+    return configuration_hash(point_configuration(e, e.builds.front(), e.renders.front(), "mesh"));
+  };
+  EXPECT_EQ(hash("{}"), hash(R"({"prune": false, "needs": "scene"})"));
+  EXPECT_NE(hash("{}"), hash(R"({"prune": true})"));
+  EXPECT_NE(hash("{}"), hash(R"({"needs": "all"})"));
 }
 
 TEST(ExplainError, IsOffUnlessAskedForAndNamesTheRecordOnlyThen) {

@@ -9,6 +9,7 @@
 #include <map>
 
 #include "brick_packing.hpp"
+#include "hidden_leaves.hpp"
 #include "kd_partition.hpp"
 #include "start_grid.hpp"
 #include "structures/build_tools.hpp"
@@ -43,8 +44,18 @@ struct Brick {
   Box texels(const Options& o) const { return o.vertices ? Box{cells.lower, cells.upper + Vec3i(1)} : cells.grown(o.border); }
 };
 
+/// What was left out because the scene does not show it.
+struct Pruned {
+  std::int64_t leaves = 0;
+  std::int64_t bricks = 0;        ///< subgrids of which nothing is stored
+  std::int64_t brick_cells = 0;   ///< of bricks, by which the others shrank included
+  std::int64_t brick_texels = 0;  ///< the same with borders
+  std::int64_t leaf_cells = 0;
+};
+
 struct Plan {
   Tree tree;
+  Pruned pruned;
   std::vector<Brick> bricks;
   std::vector<int> brick_of;  ///< a leaf
   Packing packing;
@@ -78,6 +89,29 @@ std::vector<Brick> make_bricks(const Tree& tree, std::vector<int>& brick_of) {
 double leaked_value(const FieldStatistics& s, const Vec3i& pool) {
   const double weight = 3 * std::ldexp(3.0, -24) * std::max({pool.x, pool.y, pool.z});
   return weight * std::max({s.max - s.min, std::abs(s.min), std::abs(s.max)});
+}
+
+/// Removes the leaves of which nothing can be seen. A brick is then the box around those that are left.
+Pruned prune(const AmrHierarchy& h, const BuildRequest& request, const Options& o, Tree& tree) {
+  Pruned pruned;
+  if (request.needs.invisible.empty()) return pruned;
+  const auto count = [&](const Tree& t, int sign) {
+    std::vector<int> brick_of;
+    for (const Brick& b : make_bricks(t, brick_of)) {
+      pruned.bricks += sign;
+      pruned.brick_cells += sign * b.cells.cells();
+      pruned.brick_texels += sign * b.texels(o).cells();
+    }
+    for (const Leaf& leaf : t.leaves) pruned.leaf_cells += sign * leaf.cells.cells();
+    pruned.leaves += sign * static_cast<std::int64_t>(t.leaves.size());
+  };
+  count(tree, 1);
+  // the pool's size is not known yet; it is no larger
+  const Vec3i largest_pool(request.context.max_3d_texture_size);
+  const double leak = o.vertices ? leaked_value(h.statistics(request.field), largest_pool) : 0;
+  remove_leaves(tree, hidden_leaves(h, request, tree, {o.vertices, o.border, leak}));
+  count(tree, -1);
+  return pruned;
 }
 
 struct Stores {
@@ -194,18 +228,19 @@ class KdTree final : public Encoding {
         {"packing", "how bricks are packed into the pool", "best_fit", "\"best_fit\" or \"nfdh\""},
         {"traversal", "where the search for a leaf starts: at a grid's cell, or at the root", "grid", "\"grid\" or \"restart\""}};
   }
-  void check_parameters(const Json& parameters) const override { options(parameters, Filter::nearest); }
+  void check_parameters(const Json& parameters) const override { options(parameters, {}); }
   Support supported(const ContextInfo&) const override { return {}; }
+  bool prunes() const override { return true; }
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
-  Options options(const Json& parameters, Filter filter) const;
+  Options options(const Json& parameters, const SceneNeeds& needs) const;
   Plan plan(const AmrHierarchy& h, const BuildRequest& request, const Options& o) const;
   void plan_pool(const BuildRequest& request, const Options& o, Plan& p) const;
   void require_sizes(const BuildRequest& request, const Plan& p) const;
 };
 
-Options KdTree::options(const Json& parameters, Filter filter) const {
+Options KdTree::options(const Json& parameters, const SceneNeeds& needs) const {
   const auto second = [&](const char* name, const char* first_value, const char* second_value) {
     const Json& value = parameters.at(name);
     if (value != first_value && value != second_value)
@@ -217,8 +252,8 @@ Options KdTree::options(const Json& parameters, Filter filter) const {
   Options o;
   o.paper_packing = second("packing", "best_fit", "nfdh");
   o.grid = !second("traversal", "grid", "restart");
-  o.vertices = filter == Filter::linear_vertex;
-  o.border = filter == Filter::linear_lod ? 1 : 0;
+  o.vertices = needs.filter == Filter::linear_vertex;
+  o.border = needs.filter == Filter::linear_lod || (needs.everything && !o.vertices) ? 1 : 0;
   return o;
 }
 
@@ -269,6 +304,7 @@ void KdTree::require_sizes(const BuildRequest& request, const Plan& p) const {
 Plan KdTree::plan(const AmrHierarchy& h, const BuildRequest& request, const Options& o) const {
   Plan p;
   p.tree = build_tree(h);
+  p.pruned = prune(h, request, o, p.tree);
   p.bricks = make_bricks(p.tree, p.brick_of);
   const bool validity = any_missing(h, request);
   for (const Leaf& leaf : p.tree.leaves) {
@@ -380,6 +416,8 @@ Json statistics(const Options& o, const Plan& p) {
   json["mixed_nodes"] = t.mixed;
   json["leaves"] = p.leaf_count();
   json["empty_leaves"] = t.empty;
+  json["pruned_leaves"] = p.pruned.leaves;
+  json["pruned_bricks"] = p.pruned.bricks;
   json["depth"] = t.depth;
   json["subgrids"] = t.subgrids;
   json["cut_subgrids"] = t.cut_subgrids;
@@ -394,7 +432,7 @@ Json statistics(const Options& o, const Plan& p) {
 
 /// Texels of subgrids that others refine everywhere, and of the parts of others around which no leaf cell lies.
 std::int64_t undrawn_cells(const AmrHierarchy& h, const Plan& p) {
-  std::int64_t cells = h.stored_cells();
+  std::int64_t cells = h.stored_cells() - p.pruned.brick_cells;
   for (const Brick& b : p.bricks) cells -= b.cells.cells();
   return cells;
 }
@@ -402,6 +440,9 @@ std::int64_t undrawn_cells(const AmrHierarchy& h, const Plan& p) {
 std::vector<LeftOut> left_out(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& p) {
   std::vector<LeftOut> list;
   const std::int64_t value_bytes = std::int64_t{request.field_count()} * texel_bytes(request.storage);
+  if (p.pruned.leaves > 0)
+    list.push_back({"leaves, and what they leave of bricks", "the transfer function hides all that is in them",
+                    p.pruned.brick_texels * value_bytes + 4 * p.data_words * p.pruned.leaves});
   if (!any_missing(h, request)) {
     std::int64_t words = p.leaf_count();
     for (const Leaf& leaf : p.tree.leaves) words += request.field_count() * words_for_bits(leaf.cells.cells());
@@ -422,7 +463,7 @@ EncodedField KdTree::build(const AmrHierarchy& h, const BuildRequest& request) c
   require_filter(*this, request.needs.filter);
   require_fields(*this, h, request);
   const Json parameters = complete_parameters(*this, request.parameters);
-  const Options o = options(parameters, request.needs.filter);
+  const Options o = options(parameters, request.needs);
   if (parameters.at("storage_kind") == "bindless")
     throw UnsupportedError("encoding kd_tree: storage_kind bindless is not available in this version; accepted: pool");
   const Plan p = plan(h, request, o);
