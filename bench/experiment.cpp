@@ -25,10 +25,12 @@ constexpr int kMostLevel = 63;
 constexpr double kAnyNumber = std::numeric_limits<double>::max();
 
 constexpr auto kAvailableRenderKeys = std::to_array<std::string_view>(
-    {"mode",         "sampling",    "step",      "width",       "height",          "skip",          "early_end", "consumer",
-     "slice_target", "integrator",  "isovalues", "iso_opacity", "surface_color",   "iso_tolerance", "shading",   "output",
-     "color_field",  "point_light", "ambient",   "shadow_step", "level_of_detail", "max_level",     "tolerance"});
-constexpr std::array<std::string_view, 2> kLaterRenderKeys = {"prune", "clip_planes"};
+    {"mode",      "sampling",     "step",        "width",       "height",      "skip",          "early_end",
+     "consumer",  "slice_target", "integrator",  "isovalues",   "iso_opacity", "surface_color", "iso_tolerance",
+     "shading",   "output",       "color_field", "point_light", "ambient",     "shadow_step",   "level_of_detail",
+     "max_level", "tolerance",    "prune",       "needs"});
+constexpr std::array<std::string_view, 1> kLaterRenderKeys = {"clip_planes"};
+constexpr std::array<std::string_view, 2> kNeeds = {"scene", "all"};
 constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
 
 /// How many lists deep one value of this key is; what lies deeper is an axis.
@@ -77,6 +79,8 @@ Json unnamed_render_json(const RenderPoint& render) {
   Json json = render_json(render);
   json.erase("view_name");
   json.erase("transfer_function_name");
+  if (!render.settings.prune) json.erase("prune");  // older records keep their names
+  if (!render.settings.everything) json.erase("needs");
   return json;
 }
 
@@ -98,9 +102,9 @@ class Parser {
 
  private:
   void accept_root_keys() const {
-    Names keys = {"name",      "datasets", "encodings",         "filters", "storage", "filtering",
-                  "render",    "views",    "transfer_function", "frames",  "warm_up", "seed",
-                  "reference", "context",  "memory_limit",      "check",   "baseline"};
+    Names keys = {"name",      "datasets", "encodings",         "filters", "storage",  "filtering",
+                  "render",    "views",    "transfer_function", "frames",  "warm_up",  "seed",
+                  "reference", "context",  "memory_limit",      "check",   "baseline", "explain_error"};
     if (scene_) keys.push_back("region");
     root_.accept_keys(keys);
   }
@@ -303,6 +307,10 @@ class Parser {
     const std::vector<RenderPoint> settings = parse_settings();
     const std::vector<RenderPoint> views = parse_views();
     const std::vector<RenderPoint> functions = parse_transfer_functions();
+    for (const RenderPoint& point : settings)
+      if (point.settings.prune && functions.size() > 1)
+        root_.find("transfer_function")
+            ->fail("with 'prune' the transfer function may not change: what one hides another may show; accepted: one");
     for (const RenderPoint& view : views)
       for (const RenderPoint& function : functions)
         for (RenderPoint render : settings) {
@@ -364,6 +372,7 @@ class Parser {
     else
       point.settings.isosurfaces = {};  // other modes have no use for it
     set_light(point.settings, choice);
+    if (point.settings.prune) require_prunable(point.settings, *find(choice, "prune"));
     return point;
   }
 
@@ -396,6 +405,11 @@ class Parser {
     } catch (const Error& e) {
       (integrator != nullptr ? integrator : tolerance)->fail(e.what());
     }
+  }
+
+  /// What is not built cannot be seen later.
+  static void require_prunable(const RenderSettings& s, const JsonNode& prune) {
+    located(prune, [&] { validate_prune(s); });
   }
 
   /// One opacity stands for all isovalues; complaints name the key they are about.
@@ -457,6 +471,8 @@ class Parser {
     if (key == "width") s.width = static_cast<int>(node.integer(1, kMaxPictureEdge));
     if (key == "height") s.height = static_cast<int>(node.integer(1, kMaxPictureEdge));
     if (key == "skip") s.skip = node.boolean();
+    if (key == "prune") s.prune = node.boolean();
+    if (key == "needs") s.everything = node.one_of(kNeeds) == "all";
     if (key == "early_end" && !node.json().is_null()) s.early_end = node.number(0, 1);
     if (key == "consumer") s.consumer = located(node, [&] { return parse_consumer(node.text()); });
     if (key == "slice_target") s.slice_target = located(node, [&] { return parse_slice_target(node.text()); });
@@ -565,6 +581,11 @@ class Parser {
       experiment_.minimum_psnr_db = check->require("psnr_db").number(0, 1000);
     }
     if (const auto baseline = root_.find("baseline")) experiment_.baseline = baseline->boolean();
+    if (const auto explain = root_.find("explain_error")) {
+      experiment_.explain_error = explain->boolean();
+      if (experiment_.explain_error && !experiment_.reference)
+        explain->fail("a picture without a reference has no error to explain");
+    }
     if (const auto region = root_.find("region")) parse_region(*region);
   }
 
@@ -660,6 +681,8 @@ Json render_json(const RenderPoint& render) {
                {"width", s.width},
                {"height", s.height},
                {"skip", s.skip},
+               {"prune", s.prune},
+               {"needs", s.everything ? "all" : "scene"},
                {"early_end", json_or_null(s.early_end)},
                {"view", to_json(render.view)},
                {"view_name", render.view_name},
@@ -687,6 +710,7 @@ Json point_configuration(const Experiment& experiment, const BuildPoint& build, 
   if (experiment.reference) {
     const auto& common = experiment.reference->common_filter;
     reference = {{"step", experiment.reference->step}, {"filter", common ? filter_name(*common) : "own"}};
+    if (experiment.explain_error) reference["explain"] = true;  // absent elsewhere: older records keep their names
   }
   return {{"experiment", experiment.name},
           {"dataset", dataset_hash},

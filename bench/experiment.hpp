@@ -68,6 +68,7 @@ struct Experiment {
   /// The data set's first build, drawn with the first render settings, is timed before and
   /// after every point, so that times are ratios inside one run.
   bool baseline = false;
+  bool explain_error = false;     ///< records hold the error by cause, for several more pictures a point (bench/error_split.hpp)
   std::vector<std::string> axes;  ///< places in the file whose list has more than one value
 
   std::size_t points() const { return builds.size() * renders.size(); }

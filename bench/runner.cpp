@@ -8,6 +8,7 @@
 #include <random>
 
 #include "bench/environment.hpp"
+#include "bench/error_split.hpp"
 #include "bench/image_error.hpp"
 #include "bench/record.hpp"
 #include "bench/statistics.hpp"
@@ -35,6 +36,7 @@ class Stopwatch {
 
 /// A structure on the context, with what was measured on the way there.
 struct Built {
+  BuildRequest request;
   EncodedField field;
   std::unique_ptr<GpuField> gpu;
   double build_seconds = 0;
@@ -119,7 +121,7 @@ class Runner {
   void measure_all(const BuildPoint& build, const std::vector<const RenderPoint*>& renders) {
     std::unique_ptr<Built> built;
     try {
-      built = make(build, renders.front()->settings);
+      built = make(build, scene_of(experiment_, *renders.front()));
     } catch (const UsageError&) {
       throw;  // a bad parameter concerns the whole experiment
     } catch (const std::exception& error) {
@@ -139,20 +141,19 @@ class Runner {
     }
   }
 
-  std::unique_ptr<Built> make(const BuildPoint& build, const RenderSettings& settings) {
+  std::unique_ptr<Built> make(const BuildPoint& build, const Scene& scene) {
     BuildRequest request;
     request.storage = build.storage;
     request.parameters = build.parameters;
     request.context = context_->info();
     request.memory_limit = experiment_.memory_limit.value_or(request.memory_limit);
-    Scene scene;
-    scene.settings = settings;
     request.needs = scene_needs(scene, build.filter, build.filtering);
     request.more_fields = more_fields(*mesh_, scene);
     const Encoding& encoding = find_encoding(build.encoding);
     if (const Support support = encoding.supported(request.context); !support.ok)
       throw UnsupportedError(fmt::format("encoding {}: {}", build.encoding, support.reason));
     auto built = std::make_unique<Built>();
+    built->request = request;
     const Stopwatch building;
     built->field = encoding.build(*mesh_, request);
     built->build_seconds = building.seconds();
@@ -181,10 +182,7 @@ class Runner {
       warn(record, "slices were blended in 8 bits a channel (slice_target rgba8): a historical control");
     if (!consumer->transfer_exact())
       warn(record, "the transfer function has more than 16 points: it is drawn from a table of 4096 bins");
-    const bool right = add_errors(record, picture, built.field, scene);
-    if (!record["error"].is_null() && scene.settings.prunes_levels())
-      record["error"]["split"]["level_of_detail"] = pruning_error(built, scene, picture);
-    if (!right) {
+    if (!add_errors(record, picture, built, scene)) {
       write(build, render, record);
       return;  // a wrong picture gets no time
     }
@@ -202,15 +200,17 @@ class Runner {
   static void warn(Json& record, const std::string& text) { record["context"]["warnings"].push_back(text); }
 
   /// False when the picture is wrong.
-  bool add_errors(Json& record, const Picture& picture, const EncodedField& field, const Scene& scene) {
+  bool add_errors(Json& record, const Picture& picture, const Built& built, const Scene& scene) {
     if (!experiment_.reference) return true;
     const ReferenceSettings& reference = *experiment_.reference;
     const fs::path cache = options_.folder / "references";
     std::string hash;
-    const Picture own = cached_reference(*mesh_, field.definition, scene, reference.step, cache, hash);
+    const Picture own = cached_reference(*mesh_, built.field.definition, scene, reference.step, cache, hash);
     const ErrorMetrics error = compare(picture, own);
     record["error"] = error_json(error, hash);
-    record["error"]["split"] = nullptr;
+    record["error"]["split"] = experiment_.explain_error ? explain(built, scene, own, picture) : Json();
+    if (!experiment_.explain_error && scene.settings.prunes_levels())
+      record["error"]["split"]["level_of_detail"] = pruning_error(built, scene, picture);
     const std::vector<double> pixels = pixel_errors(picture, own);
     record["error"]["p95"] = percentile(pixels, 0.95);
     if (scene.settings.integrator == Integrator::tolerance)
@@ -229,6 +229,15 @@ class Runner {
       return false;
     }
     return true;
+  }
+
+  /// The error by cause.
+  Json explain(const Built& built, const Scene& scene, const Picture& reference, const Picture& picture) {
+    const auto truth = analytic_field(experiment_.datasets[loaded_]);
+    const double step = experiment_.reference->step;
+    const Encoding& encoding = find_encoding(built.field.encoding);
+    return split_json(split_error(
+        {*mesh_, encoding, built.request, built.field, *built.gpu, *context_, scene, reference, picture, step, truth.get()}));
   }
 
   /// What the level of detail did: the picture against that of the same structure without it.
@@ -294,7 +303,7 @@ class Runner {
     settings.transfer_function = render.transfer_function;
     settings.transfer_function_name = render.transfer_function_name;
     const std::string key = render_json(settings).dump();
-    if (!baseline_) baseline_ = make(*first, settings.settings);
+    if (!baseline_) baseline_ = make(*first, scene_of(experiment_, settings));
     if (!baseline_consumer_ || key != baseline_key_) {
       baseline_consumer_ = make_consumer(*context_, *mesh_, baseline_->field, *baseline_->gpu, scene_of(experiment_, settings));
       baseline_key_ = key;
@@ -386,6 +395,10 @@ AmrHierarchy load_dataset(const Experiment& experiment, const DatasetSource& sou
     }
   }
   return AmrHierarchy(read_mesh(*source.file, fields));
+}
+
+std::unique_ptr<AnalyticField> analytic_field(const DatasetSource& source) {
+  return source.file ? nullptr : make_analytic_field(source.generate);
 }
 
 std::vector<int> more_fields(const AmrHierarchy& hierarchy, const Scene& scene) {

@@ -3,12 +3,14 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "bench/experiment.hpp"
 #include "renderers/context.hpp"
 #include "renderers/consumer.hpp"
+#include "structures/synthetic.hpp"
 
 namespace amrtex {
 
@@ -35,6 +37,9 @@ RunSummary run_experiment(const Experiment& experiment, const RunOptions& option
 /// The mesh of one data set of an experiment, with the field that is wanted first, and after it
 /// those that some render point colours surfaces by.
 AmrHierarchy load_dataset(const Experiment& experiment, const DatasetSource& source);
+
+/// The field that a generated data set samples; null for a file.
+std::unique_ptr<AnalyticField> analytic_field(const DatasetSource& source);
 
 /// Fields beside the drawn one that the scene fetches. Throws UsageError naming the fields there are.
 std::vector<int> more_fields(const AmrHierarchy& hierarchy, const Scene& scene);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "renderers/consumer.hpp"
+#include "renderers/cpu_field.hpp"
 #include "renderers/draw_target.hpp"
 #include "renderers/gpu_timer.hpp"
 
@@ -34,5 +35,7 @@ class Raycaster final : public Consumer {
 
 /// The same text on the CPU, all cores.
 Picture render_on_cpu(const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene, bool double_precision);
+/// The same with a CPU build of one's own.
+Picture trace_on_cpu(CpuField& cpu, const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene);
 
 }  // namespace amrtex

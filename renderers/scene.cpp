@@ -271,6 +271,20 @@ void validate_integrator(const RenderSettings& s) {
         fmt::format("the tolerance {} is the error asked of a channel of a pixel; it must lie in (0, 1]", s.tolerance));
 }
 
+void validate_prune(const RenderSettings& s) {
+  if (!s.prune) return;
+  if (s.mode != Mode::dvr)
+    throw UsageError(
+        fmt::format("in mode {} the transfer function hides nothing for good; accepted: mode dvr", mode_name(s.mode)));
+  if (s.everything) throw UsageError("needs 'all' keeps what pruning leaves out; accepted: one of both");
+  if (s.prunes_levels())
+    throw UsageError("level_of_detail and max_level draw cells that pruning knows nothing of; accepted: one of both");
+  if (s.integrator == Integrator::preintegrated || s.integrator == Integrator::tolerance)
+    throw UsageError(
+        fmt::format("the integrator {} joins hidden values to visible ones; accepted: exponential_midpoint, euler, left",
+                    integrator_name(s.integrator)));
+}
+
 Mode parse_mode(std::string_view name) {
   for (const Mode mode : {Mode::dvr, Mode::projection, Mode::mip, Mode::iso, Mode::dvr_iso})
     if (name == mode_name(mode)) return mode;

@@ -138,6 +138,8 @@ struct RenderSettings {
   int height = 512;                 ///< pixels
   bool skip = true;                 ///< regions that the transfer function makes invisible are skipped
   std::optional<double> early_end;  ///< opacity at which a ray ends; off when absent
+  bool prune = false;       ///< what the transfer function hides is not even built (mode dvr); then it may not change
+  bool everything = false;  ///< structures hold also what the scene does not need, to see what leaving out saves
   Isosurfaces isosurfaces;
   std::optional<PointLight> point_light;  ///< absent: light of all places alike
   /// Refined cells are drawn themselves where they are smaller on the picture, pixels; off when absent.
@@ -152,6 +154,8 @@ struct RenderSettings {
   int picture_channels() const;
 };
 
+/// Throws UsageError where what the transfer function hides cannot be left out without a change of the picture.
+void validate_prune(const RenderSettings& settings);
 /// Throws UsageError: a lamp whose numbers are none, or in a picture without a volume. Nothing where there is no lamp.
 void validate_light(const RenderSettings& settings);
 /// Throws UsageError where the integrator does not go with the mode, the sampling or the tolerance.

@@ -138,6 +138,15 @@ std::vector<double> invisible_ranges(const TransferFunction& tf, double margin) 
   return ranges;
 }
 
+/// Is the transfer function evaluated from its points, or from a table?
+bool is_exact(const TransferFunction& tf) { return std::max(tf.extinction.size(), tf.color.size()) <= kMostPoints; }
+
+std::vector<double> invisible_ranges(const TransferFunction& tf) {
+  const double first = tf.axis(tf.extinction.front().value);
+  const double span = tf.axis(tf.extinction.back().value) - first;
+  return invisible_ranges(tf, is_exact(tf) ? 1e-6 * (span + std::abs(first)) : 1.01 * span / kTableBins);
+}
+
 std::vector<double> numbers(const Vec3d& v) { return {v.x, v.y, v.z}; }
 
 void add_camera(const AmrHierarchy& h, const Scene& scene, UniformValues& uniforms) {
@@ -342,7 +351,7 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
   if (s.draws_volume()) {
     const TransferFunction& tf = scene.transfer_function;
     const double per_unit = extinction_unit(h, scene);
-    b.transfer_exact = std::max(tf.extinction.size(), tf.color.size()) <= kMostPoints;
+    b.transfer_exact = is_exact(tf);
     if (b.transfer_exact) {
       add_points(tf, per_unit, b.uniforms);
       extinction_points = static_cast<int>(tf.extinction.size());
@@ -352,10 +361,7 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
       color_points = 0;
       add_table(tf, per_unit, b);
     }
-    const double span = tf.axis(tf.extinction.back().value) - tf.axis(tf.extinction.front().value);
-    const double margin =
-        b.transfer_exact ? 1e-6 * (span + std::abs(tf.axis(tf.extinction.front().value))) : 1.01 * span / kTableBins;
-    const std::vector<double> invisible = invisible_ranges(tf, margin);
+    const std::vector<double> invisible = invisible_ranges(tf);
     invisible_count = static_cast<int>(invisible.size() / 2);
     if (invisible_count > 0) b.uniforms.push_back({"u_invisible_ranges", invisible});
   }
@@ -379,10 +385,16 @@ SceneNeeds scene_needs(const Scene& scene, Filter filter, Filtering filtering) {
   SceneNeeds needs;
   needs.filter = filter;
   needs.filtering = filter == Filter::nearest ? Filtering::manual : filtering;
-  needs.value_ranges = scene.settings.skip;
   needs.level_of_detail = scene.settings.prunes_levels();
-  needs.gradients = scene.settings.draws_surfaces() && scene.settings.isosurfaces.shading == Shading::gradient;
   needs.draw_boxes = scene.settings.consumer != ConsumerKind::raycast;
+  needs.everything = scene.settings.everything;
+  needs.value_ranges = scene.settings.skip || needs.everything;
+  const bool lit = scene.settings.draws_surfaces() && scene.settings.isosurfaces.shading == Shading::gradient;
+  needs.gradients = lit || needs.everything;
+  if (!scene.settings.prune) return needs;
+  validate_prune(scene.settings);
+  const std::vector<double> ranges = invisible_ranges(scene.transfer_function);
+  for (std::size_t i = 0; i < ranges.size(); i += 2) needs.invisible.push_back({ranges[i], ranges[i + 1]});
   return needs;
 }
 

@@ -35,7 +35,7 @@ UniformValues field_uniforms(const AmrHierarchy& hierarchy, const EncodedField& 
 /// Everything that a consumer of shaders/march.glsl needs beside the field's own part.
 SceneBindings bind_scene(const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene);
 
-/// What builders may leave out for this scene.
+/// What builders may leave out for this scene. Throws UsageError where `prune` is asked for in a mode other than dvr.
 SceneNeeds scene_needs(const Scene& scene, Filter filter, Filtering filtering);
 
 }  // namespace amrtex

@@ -50,6 +50,18 @@ std::uint32_t encode_range(ValueRange range, double origin, Storage storage, Sto
   return below | (std::min(above, 0x7f80U) << 16);
 }
 
+bool hidden(const SceneNeeds& needs, ValueRange range, double origin, Storage storage, StorageScale scale) {
+  if (needs.invisible.empty()) return false;
+  if (range.empty()) return true;
+  const std::uint32_t code = encode_range(range, origin, storage, scale);
+  // as decode_range and the uniforms: in floats
+  const float low = static_cast<float>(origin) + std::bit_cast<float>(code << 16);
+  const float high = static_cast<float>(origin) + std::bit_cast<float>(code & 0xffff0000U);
+  for (const auto& [first, last] : needs.invisible)
+    if (low >= static_cast<float>(first) && high <= static_cast<float>(last)) return true;
+  return false;
+}
+
 void store_values(Storage storage, StorageScale scale, const double* values, std::size_t count, std::byte* data,
                   std::size_t first) {
   if (storage == Storage::r32f) {
@@ -100,6 +112,7 @@ int common_ratio_shift(const AmrHierarchy& hierarchy) {
 }  // namespace
 
 bool any_missing(const AmrHierarchy& hierarchy, const BuildRequest& request) {
+  if (request.needs.everything) return true;
   for (int i = 0; i < request.field_count(); ++i)
     if (hierarchy.has_missing(request.field_at(i))) return true;
   return false;

@@ -141,6 +141,14 @@ void require_level_of_detail(const Encoding& encoding, const SceneNeeds& needs) 
 }
 
 void require_fields(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request) {
+  if (!request.needs.invisible.empty() && !encoding.prunes()) {
+    std::vector<std::string_view> names;
+    for (const Encoding* e : all_encodings())
+      if (e->prunes()) names.push_back(e->name());
+    throw UnsupportedError(
+        fmt::format("encoding {}: prune: it has no parts that are left out where nothing is to be seen; accepted: {}",
+                    encoding.name(), fmt::join(names, ", ")));
+  }
   if (request.field_count() > kMostFields)
     throw UsageError(fmt::format("encoding {}: {} fields in one structure; at most {} are supported", encoding.name(),
                                  request.field_count(), kMostFields));

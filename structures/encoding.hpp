@@ -1,6 +1,7 @@
 // The C++ side of the sampler contract: what an encoding is to everybody else.
 #pragma once
 
+#include <array>
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -66,6 +67,10 @@ struct SceneNeeds {
   bool gradients = false;        ///< surfaces are lit: stored gradients are of use where an encoding has room for them
   bool level_of_detail = false;  ///< refined cells may be drawn in place of what lies below them
   bool draw_boxes = false;       ///< the consumer draws box by box: EncodedField::draw_tree, where the encoding can give one
+  bool everything = false;   ///< nothing is left out for want of need: what leaving out saves is measured against this
+  /// First and last value of intervals without extinction, ascending (renderers/scene_bindings.hpp): parts of the structure whose
+  /// values lie in one of them are left out. Empty: all are kept.
+  std::vector<std::array<double, 2>> invisible = {};
   bool operator==(const SceneNeeds&) const = default;
 };
 
@@ -156,6 +161,8 @@ class Encoding {
   virtual std::vector<UnsupportedValue> unsupported_values(const ContextInfo& /*context*/) const { return {}; }
   /// Can refined cells be drawn in place of what lies below them (SceneNeeds::level_of_detail)? Else why not.
   virtual Support level_of_detail() const { return {false, "it stores no values of refined cells"}; }
+  /// Can parts that the transfer function hides be left out (SceneNeeds::invisible)? Others refuse to be asked.
+  virtual bool prunes() const { return false; }
   /// Builds the field. Throws UsageError for a bad parameter, UnsupportedError for
   /// a filter or a size that this encoding cannot take (naming what it can), and
   /// BudgetError before allocation when the result would pass the limits.
@@ -173,7 +180,8 @@ Json complete_parameters(const Encoding& encoding, const Json& given);
 void require_filter(const Encoding& encoding, Filter filter);
 /// Throws UnsupportedError with the reason and the encodings that have it when a level of detail is needed and not there.
 void require_level_of_detail(const Encoding& encoding, const SceneNeeds& needs);
-/// Throws UsageError that says how many fields are supported, or which index the mesh does not have.
+/// Throws UsageError that says how many fields are supported, or which index the mesh does not have, and
+/// UnsupportedError where parts are to be left out and the encoding has none that could be.
 void require_fields(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request);
 /// Throws BudgetError with the bytes needed when `bytes` passes the limit.
 void require_budget(const Encoding& encoding, std::int64_t bytes, const BuildRequest& request);

@@ -392,6 +392,21 @@ TEST_F(CommandLine, RenderWritesPngAndFloats) {
   EXPECT_GT(*std::max_element(picture.values.begin(), picture.values.end()), 0.1) << "an empty picture";
 }
 
+TEST_F(CommandLine, RenderExplainsAPicturesErrorByCause) {
+  const std::string scene = experiment_file(with(one_point(), "render", {{"mode", "projection"}, {"width", 16}, {"height", 16}}));
+  const Result table = amrtex({"render", scene, "--explain-error"});
+  EXPECT_EQ(table.exit_code, 0) << table.err;
+  for (const char* cause : {"step", "encoding", "storage", "arithmetic", "driver", "filtering", "early_end", "filter"})
+    EXPECT_THAT(table.out, HasSubstr(fmt::format("| {} |", cause)));
+  const Result json = amrtex({"render", scene, "--explain-error", "--json"});
+  const Json split = Json::parse(json.out).at("split");
+  EXPECT_GT(split.at("step").at("rmse"), 0);
+  EXPECT_LE(split.at("sum_closes"), 1e-12);
+  expect_complaint(amrtex({"render", scene}), 2, HasSubstr("-o is missing"));
+  expect_complaint(amrtex({"render", scene, "--json", "-o", at("a.png")}), 2, HasSubstr("--explain-error"));
+  expect_complaint(amrtex({"render", scene, "--explain-error", "--reference"}), 2, HasSubstr("--reference"));
+}
+
 TEST_F(CommandLine, RenderOfAValueHasOneChannelAndAColorBar) {
   const std::string scene = experiment_file(with(one_point(), "render", {{"mode", "projection"}, {"width", 32}, {"height", 64}}));
   EXPECT_EQ(amrtex({"render", scene, "-o", at("a.npy")}).exit_code, 0);

@@ -45,6 +45,8 @@ struct BuildOptions {
   ContextKind context = ContextKind::egl;  ///< whose handles a structure may use
   bool draw_boxes = false;
   bool level_of_detail = false;
+  bool everything = false;
+  std::vector<std::array<double, 2>> invisible = {};
 };
 
 /// Made once a process; never destroyed, since the drivers' libraries may be gone by then.
@@ -78,6 +80,8 @@ inline EncodedField build(const AmrHierarchy& h, const EncodingCase& c, const Bu
   request.needs.value_ranges = options.value_ranges;
   request.needs.draw_boxes = options.draw_boxes;
   request.needs.level_of_detail = options.level_of_detail;
+  request.needs.everything = options.everything;
+  request.needs.invisible = options.invisible;
   request.parameters = c.parameters;
   request.context = handle_limits(options.context);
   return c.encoding->build(h, request);

@@ -393,11 +393,15 @@ TEST(ExperimentErrors, NameKeyAndWhatIsAccepted) {
       {"render", R"({"tolerance": [0.1, -0.1]})", "render.tolerance[1]:", "above 0"},
       {"render", R"({"tolerance": 2})", "render.tolerance:", "(0, 1]"},
       {"render", R"({"tolerance": "NaN"})", "render.tolerance:", "above 0"},
-      {"render", R"({"prune": true})", "render.prune: not available in this version", "early_end"},
       {"render", R"({"level_of_detail": 0})", "render.level_of_detail:", "above 0"},
       {"render", R"({"level_of_detail": "pixel"})", "render.level_of_detail:", "above 0"},
       {"render", R"({"max_level": -1})", "render.max_level:", "from 0 to 63"},
       {"render", R"({"max_level": 1.5})", "render.max_level:", "an integer"},
+      {"render", R"({"mode": "projection", "prune": true})", "render.prune: in mode projection", "dvr"},
+      {"render", R"({"prune": true, "max_level": 1})", "render.prune:", "max_level"},
+      {"render", R"({"prune": true, "tolerance": 0.1})", "render.prune:", "integrator tolerance"},
+      {"render", R"({"prune": true, "needs": "all"})", "render.prune: needs 'all' keeps", "one of both"},
+      {"render", R"({"needs": "some"})", "render.needs", "scene, all"},
       {"render", R"({"clip_planes": [[1, 0, 0, 0]]})", "render.clip_planes: not available in this version", "early_end"},
       {"render", R"({"widht": 4})", "render.widht:", "did you mean 'width'?"},
       {"views", "[]", "views:", "empty list"},
@@ -499,6 +503,45 @@ TEST(Suggestion, OnlyNamesWhatIsNear) {
   const std::vector<std::string_view> names = {"width", "height"};
   EXPECT_EQ(suggestion("widht", names), "; did you mean 'width'?");
   EXPECT_EQ(suggestion("colour", names), "");
+}
+
+TEST(Prune, IsRefusedWhereTheTransferFunctionWillChange) {
+  Json json = Json::parse(with("render", R"({"mode": "dvr", "prune": true})"));
+  EXPECT_EQ(complaint(json.dump()), "accepted");
+  const Json one = json["transfer_function"];
+  Json other = one;
+  other["extinction"] = {{0.5, 0}, {1, 5}};
+  json["transfer_function"] = {one, other};
+  EXPECT_THAT(complaint(json.dump()), AllOf(HasSubstr("transfer_function"), HasSubstr("prune")));
+  json["transfer_function"] = one;
+  json["transfer_function"]["extinction"] = {{{0, 0}, {1, 5}}, {{0.5, 0}, {1, 5}}};
+  EXPECT_THAT(complaint(json.dump()), HasSubstr("prune"));
+}
+
+TEST(Prune, AndNeedsNameTheRecordOnlyWhereTheyAreNotTheDefault) {
+  const auto hash = [](const std::string& render) {
+    const Experiment e = parsed(with("render", render));
+    return configuration_hash(point_configuration(e, e.builds.front(), e.renders.front(), "mesh"));
+  };
+  EXPECT_EQ(hash("{}"), hash(R"({"prune": false, "needs": "scene"})"));
+  EXPECT_NE(hash("{}"), hash(R"({"prune": true})"));
+  EXPECT_NE(hash("{}"), hash(R"({"needs": "all"})"));
+}
+
+TEST(ExplainError, IsOffUnlessAskedForAndNamesTheRecordOnlyThen) {
+  const Experiment plain = parsed(kSmall);
+  const Experiment explained = parsed(with("explain_error", "true"));
+  EXPECT_FALSE(plain.explain_error);
+  EXPECT_TRUE(explained.explain_error);
+  const auto hash = [](const Experiment& e) {
+    return configuration_hash(point_configuration(e, e.builds.front(), e.renders.front(), "mesh"));
+  };
+  EXPECT_EQ(hash(plain), hash(parsed(with("explain_error", "false"))));
+  EXPECT_NE(hash(plain), hash(explained));
+  EXPECT_THAT(complaint(with("explain_error", "1")), HasSubstr("explain_error"));
+  Json both = Json::parse(with("explain_error", "true"));
+  both["reference"] = nullptr;
+  EXPECT_THAT(complaint(both.dump()), HasSubstr("no error to explain"));
 }
 
 }  // namespace

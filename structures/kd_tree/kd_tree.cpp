@@ -9,6 +9,7 @@
 #include <map>
 
 #include "brick_packing.hpp"
+#include "hidden_leaves.hpp"
 #include "kd_detail.hpp"
 #include "kd_draw_tree.hpp"
 #include "kd_partition.hpp"
@@ -54,8 +55,18 @@ struct Brick {
   Box texels(const Options& o) const { return o.vertices ? Box{cells.lower, cells.upper + Vec3i(1)} : cells.grown(o.border); }
 };
 
+/// What was left out because the scene does not show it.
+struct Pruned {
+  std::int64_t leaves = 0;
+  std::int64_t bricks = 0;        ///< subgrids of which nothing is stored
+  std::int64_t brick_cells = 0;   ///< of bricks, by which the others shrank included
+  std::int64_t brick_texels = 0;  ///< the same with borders
+  std::int64_t leaf_cells = 0;
+};
+
 struct Plan {
   Tree tree;
+  Pruned pruned;
   std::vector<Brick> bricks;
   std::vector<int> brick_of;  ///< a leaf
   Packing packing;            ///< bindless: every brick at 0 and the largest extents
@@ -108,6 +119,29 @@ bool needs_brick_sizes(const BuildRequest& request, const Options& o) {
 double leaked_value(const FieldStatistics& s, const Vec3i& pool) {
   const double weight = 3 * std::ldexp(3.0, -24) * std::max({pool.x, pool.y, pool.z});
   return weight * std::max({s.max - s.min, std::abs(s.min), std::abs(s.max)});
+}
+
+/// Removes the leaves of which nothing can be seen. A brick is then the box around those that are left.
+Pruned prune(const AmrHierarchy& h, const BuildRequest& request, const Options& o, Tree& tree) {
+  Pruned pruned;
+  if (request.needs.invisible.empty()) return pruned;
+  const auto count = [&](const Tree& t, int sign) {
+    std::vector<int> brick_of;
+    for (const Brick& b : make_bricks(t, brick_of)) {
+      pruned.bricks += sign;
+      pruned.brick_cells += sign * b.cells.cells();
+      pruned.brick_texels += sign * b.texels(o).cells();
+    }
+    for (const Leaf& leaf : t.leaves) pruned.leaf_cells += sign * leaf.cells.cells();
+    pruned.leaves += sign * static_cast<std::int64_t>(t.leaves.size());
+  };
+  count(tree, 1);
+  // the pool's size is not known yet; it is no larger
+  const Vec3i largest_pool(request.context.max_3d_texture_size);
+  const double leak = o.vertices ? leaked_value(h.statistics(request.field), largest_pool) : 0;
+  remove_leaves(tree, hidden_leaves(h, request, tree, {o.vertices, o.border, leak}));
+  count(tree, -1);
+  return pruned;
 }
 
 struct Stores {
@@ -235,6 +269,7 @@ class KdTree final : public Encoding {
     return {{"storage_kind", "bindless", support.reason}};
   }
   Support level_of_detail() const override { return {}; }
+  bool prunes() const override { return true; }
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
@@ -262,7 +297,7 @@ Options KdTree::options(const Json& parameters, const SceneNeeds& needs) const {
   o.wrap = parameters.at("wrap").get<bool>();
   o.detail = needs.level_of_detail;
   o.vertices = needs.filter == Filter::linear_vertex;
-  o.border = needs.filter == Filter::linear_lod ? 1 : 0;
+  o.border = needs.filter == Filter::linear_lod || (needs.everything && !o.vertices) ? 1 : 0;
   return o;
 }
 
@@ -319,6 +354,7 @@ void KdTree::require_sizes(const BuildRequest& request, const Options& o, const 
 Plan KdTree::plan(const AmrHierarchy& h, const BuildRequest& request, const Options& o) const {
   Plan p;
   p.tree = build_tree(h, {.wrap = o.wrap, .covers = o.detail, .limits = {}});
+  p.pruned = prune(h, request, o, p.tree);
   if (o.detail) add_detail_blocks(h, p.tree);
   p.bricks = make_bricks(p.tree, p.brick_of);
   const bool validity = any_missing(h, request);
@@ -494,6 +530,8 @@ Json statistics(const Options& o, const Plan& p) {
   json["leaves"] = p.leaf_count;
   json["empty_leaves"] = t.empty;
   if (o.detail) json["detail_blocks"] = p.block_count() - p.leaf_count;
+  json["pruned_leaves"] = p.pruned.leaves;
+  json["pruned_bricks"] = p.pruned.bricks;
   json["depth"] = t.depth;
   json["subgrids"] = t.subgrids;
   json["cut_subgrids"] = t.cut_subgrids;
@@ -508,7 +546,7 @@ Json statistics(const Options& o, const Plan& p) {
 
 /// Texels of subgrids that others refine everywhere, and of the parts of others around which no leaf cell lies.
 std::int64_t undrawn_cells(const AmrHierarchy& h, const Plan& p) {
-  std::int64_t cells = h.stored_cells();
+  std::int64_t cells = h.stored_cells() - p.pruned.brick_cells;
   for (const Brick& b : p.bricks) cells -= b.cells.cells();
   return cells;
 }
@@ -516,6 +554,9 @@ std::int64_t undrawn_cells(const AmrHierarchy& h, const Plan& p) {
 std::vector<LeftOut> left_out(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& p) {
   std::vector<LeftOut> list;
   const std::int64_t value_bytes = std::int64_t{request.field_count()} * texel_bytes(request.storage);
+  if (p.pruned.leaves > 0)
+    list.push_back({"leaves, and what they leave of bricks", "the transfer function hides all that is in them",
+                    p.pruned.brick_texels * value_bytes + 4 * p.data_words * p.pruned.leaves});
   if (!any_missing(h, request)) {
     std::int64_t words = p.block_count();
     for (const Leaf& leaf : p.tree.leaves) words += request.field_count() * words_for_bits(leaf.cells.cells());

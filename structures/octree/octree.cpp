@@ -735,7 +735,7 @@ Plan Octree::plan(const AmrHierarchy& h, const BuildRequest& request, const Opti
         fmt::format("encoding octree: {} nodes or more, an address of {} bits tells at most {} apart ({} leaf cells fit)",
                     tree.nodes, AMRTEX_OCTREE_INDEX_BITS, kMostNodes, 7 * kMostNodes + 1));
   Plan p;
-  p.validity = h.has_missing(request.field) && !o.paper_layout;
+  p.validity = any_missing(h, request) && !o.paper_layout;
   plan_stores(request, o, tree, p);
   const Vec3l texture(p.texture.nodes());
   const std::int64_t in_texture = texture.x * texture.y * texture.z;
@@ -861,7 +861,7 @@ EncodedField Octree::build(const AmrHierarchy& h, const BuildRequest& request) c
     t.roles = (t.holds_values ? stores.values : stores.lod).roles;
   }
   field.statistics = statistics(tree, p, counts);
-  field.left_out = left_out(request, o, tree, p, h.has_missing(request.field));
+  field.left_out = left_out(request, o, tree, p, any_missing(h, request));
   add_shader_inputs(o, p, tree, field);
   field.shader.defines.emplace_back("AMRTEX_OCTREE_GRADIENTS", gradients ? 1 : 0);
   for (HostTexture* t :
