@@ -1,4 +1,7 @@
 #include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
 
 #include "bench/commands.hpp"
 #include "bench/verify/verify.hpp"
@@ -21,12 +24,15 @@ int run(const Arguments& a) {
   verify::VerifyOptions options;
   options.context = parse_context_kind(a.context);
   options.full = a.full;
+  const bool terminal = isatty(STDERR_FILENO) != 0;
+  if (terminal) options.progress = [](const std::string& name) { fmt::print(stderr, "\r\033[K{}", name.substr(0, 100)); };
   verify::Report report;
   verify::VerifyContext context(options, report);
   for (const verify::Suite* s : chosen) {
     context.begin(std::string(s->name));
     s->run(context);
   }
+  if (terminal) fmt::print(stderr, "\r\033[K");
   if (a.json) {
     fmt::print("{}\n", verify::to_json(report).dump(1));
   } else {

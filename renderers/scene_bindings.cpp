@@ -156,6 +156,32 @@ void add_surfaces(const Scene& scene, const EncodedField& field, SceneBindings& 
   b.defines.emplace_back("AMRTEX_SHADING", iso.shading == Shading::gradient ? 1 : 0);
 }
 
+/// Cells of one level that may lie in a row: along the diagonal of its largest patch, or of the largest page.
+double longest_run(const AmrHierarchy& h) {
+  double longest = 128 * std::sqrt(3.0);
+  for (int l = 0; l < h.level_count(); ++l)
+    for (const Patch& p : h.patches(l)) longest = std::max(longest, glm::length(Vec3d(p.box.size())));
+  return longest;
+}
+
+/// Throws UsageError for what no picture can be made of, UnsupportedError for more steps than the loops count.
+void check_sampling(const AmrHierarchy& h, const Scene& scene) {
+  const double step = scene.settings.step;
+  if (!(step > 0) || !std::isfinite(step))
+    throw UsageError(fmt::format("step {}: accepted: a positive number of cell widths", step));
+  if (scene.region)
+    for (int a = 0; a < 3; ++a)
+      if (std::isnan((*scene.region)[0][a]) || std::isnan((*scene.region)[1][a]))
+        throw UsageError("region: a corner is no number; accepted: two corners in world units");
+  // lattice: samples of a ray are counted in 32 bits; adaptive: those of a region in a float's 24
+  const bool lattice = scene.settings.sampling == Sampling::lattice;
+  const double cells = lattice ? glm::length((h.domain_upper() - h.domain_lower()) / smallest_edge(h)) : longest_run(h);
+  const double most = lattice ? 0x1p31 : 0x1p24;
+  if (cells / step >= most)
+    throw UnsupportedError(fmt::format("step {}: {:.3g} samples of sampling {} may lie in a row; at most {:.3g} are counted",
+                                       step, cells / step, sampling_name(scene.settings.sampling), most));
+}
+
 /// What the shader draws: pictures of depth and normals have no volume.
 Mode shader_mode(const RenderSettings& s) { return s.mode == Mode::dvr_iso && !s.draws_volume() ? Mode::iso : s.mode; }
 
@@ -186,6 +212,7 @@ UniformValues field_uniforms(const AmrHierarchy& h, const EncodedField& field) {
 
 SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const Scene& scene) {
   const RenderSettings& s = scene.settings;
+  check_sampling(h, scene);
   const double unit = smallest_edge(h);
   const Vec3d size = h.domain_upper() - h.domain_lower();
   const double longest = std::max({size.x, size.y, size.z});

@@ -82,7 +82,12 @@ void VerifyContext::skip(const std::string& name, const EncodingCase* c, std::st
                               c != nullptr ? std::string(filter_name(c->filter)) : "", std::move(reason)});
 }
 
+void VerifyContext::tell(const std::string& name) const {
+  if (options_.progress) options_.progress(suite_ + ": " + name);
+}
+
 void VerifyContext::for_each(const std::string& name, std::span<const EncodingCase> cases, const Body& body) {
+  tell(name);
   for (const EncodingCase& c : cases) try {
       if (const auto check = body(c)) add(name, &c, *check);
     } catch (const UnsupportedError& e) {
@@ -95,6 +100,7 @@ void VerifyContext::for_each(const std::string& name, std::span<const EncodingCa
 }
 
 void VerifyContext::once(const std::string& name, const std::function<Check()>& body) {
+  tell(name);
   try {
     add(name, nullptr, body());
   } catch (const std::exception& e) {
@@ -139,10 +145,10 @@ std::vector<Table> to_tables(const Report& report) {
   for (const Suite& suite : kSuites) {
     Table table;
     table.title = fmt::format("{}: {}", suite.name, suite.asks);
-    table.columns = {{"name", "case", "", false},         {"encoding", "encoding", "", false},
-                     {"parameters", "parameters", "", false}, {"filter", "filter", "", false},
-                     {"expected", "expected", "", false}, {"observed", "observed", "", false},
-                     {"pass", "pass", "", false}};
+    table.columns = {
+        {"name", "case", "", false},     {"encoding", "encoding", "", false}, {"parameters", "parameters", "", false},
+        {"filter", "filter", "", false}, {"expected", "expected", "", false}, {"observed", "observed", "", false},
+        {"pass", "pass", "", false}};
     for (const Outcome& o : report.cases)
       if (o.suite == suite.name)
         table.rows.push_back({o.name, text_or_none(o.encoding), text_or_none(parameters_text(o.parameters)),

@@ -49,8 +49,9 @@ struct Report {
 
 struct VerifyOptions {
   ContextKind context = ContextKind::egl;
-  bool full = false;                            ///< the experiment's size, not the one of a few minutes
-  std::function<void(EncodedField&)> tamper{};  ///< done to each built field: tests break encodings with it
+  bool full = false;                                   ///< the experiment's size, not the one of a few minutes
+  std::function<void(EncodedField&)> tamper{};         ///< done to each built field: tests break encodings with it
+  std::function<void(const std::string&)> progress{};  ///< told the name of each case before it runs
 };
 
 /// What suites are handed: the context, the size, the encodings, and where outcomes go.
@@ -92,6 +93,8 @@ class VerifyContext {
   Report* report_;
   std::unique_ptr<Context> gl_;
   std::vector<EncodingCase> variants_, filters_;
+  void tell(const std::string& name) const;
+
   std::string suite_;
 };
 
