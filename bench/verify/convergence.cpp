@@ -38,23 +38,25 @@ TransferFunction gentle() {
   return tf;
 }
 
-Scene light_scene(Sampling sampling, double step) {
-  Scene s = small_scene(Mode::dvr, perspective({2.1, -1.7, 1.3}, Vec3d(0.5)), sampling, 12);
+Scene smooth_scene(Mode mode, Sampling sampling, double step) {
+  Scene s = small_scene(mode, perspective({2.1, -1.7, 1.3}, Vec3d(0.5)), sampling, 12);
   s.transfer_function = gentle();
   s.settings.step = step;
   return s;
 }
 
+/// Well below a cell: where regions are single cells, equal intervals are shorter than the step that was asked for,
+/// the more so the larger it is, which hides the order.
 std::vector<double> steps(const VerifyContext& v) {
-  return v.size(std::vector{1.0, 0.5, 0.25, 0.125}, std::vector{1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125});
+  return v.size(std::vector{0.25, 0.125, 0.0625, 0.03125}, std::vector{0.25, 0.125, 0.0625, 0.03125, 0.015625});
 }
 
-std::vector<double> step_errors(VerifyContext& v, const AmrHierarchy& h, const EncodingCase& c, Sampling sampling) {
+std::vector<double> step_errors(VerifyContext& v, const AmrHierarchy& h, const EncodingCase& c, Mode mode, Sampling sampling) {
   const EncodedField field = v.build(h, c, {.storage = Storage::r64f, .value_ranges = false});
-  const Picture exact = HierarchyReference(h, 0, field.definition).render(light_scene(sampling, 1), 1.0 / 16);
+  const Picture exact = HierarchyReference(h, 0, field.definition).render(smooth_scene(mode, sampling, 1), 1.0 / 16);
   std::vector<double> errors;
   for (const double step : steps(v))
-    errors.push_back(rms_difference(render_on_cpu(h, field, light_scene(sampling, step), true), exact));
+    errors.push_back(rms_difference(render_on_cpu(h, field, smooth_scene(mode, sampling, step), true), exact));
   return errors;
 }
 
@@ -74,7 +76,7 @@ void step_refinement(VerifyContext& v) {
   const AmrHierarchy h = MeshBuilder(Vec3i(8)).root(smooth).hierarchy();
   v.for_each_filter("3 step refinement, exponential midpoint", [&](const EncodingCase& c) -> std::optional<Check> {
     if (c.filter == Filter::nearest) return std::nullopt;  // jumps at every cell
-    return order_near(step_errors(v, h, c, Sampling::adaptive), 2, 0.2);
+    return order_near(step_errors(v, h, c, Mode::dvr, Sampling::adaptive), 2, 0.2);
   });
   v.once("3 control: step refinement, Euler opacity k ds", [] {
     // C of k = 4 x, c = x on [0, 1]: sqrt(pi / 8) erf(sqrt 2) - exp(-2)
@@ -91,18 +93,18 @@ void step_refinement(VerifyContext& v) {
 }
 
 void level_jump(VerifyContext& v) {
-  const AmrHierarchy h = nested(smooth).hierarchy();
+  const AmrHierarchy h = nested(waves).hierarchy();  // coarse cells that do not resolve it: the filters jump visibly
   const auto jumps = [](const EncodingCase& c, const FilterDefinition& d) {
     return c.filter == Filter::linear_lod || (c.filter == Filter::linear_page && d.page_size > 0);
   };
   v.for_each_filter("4 step refinement across level jumps, intervals split there",
                     [&](const EncodingCase& c) -> std::optional<Check> {
                       if (!jumps(c, v.build(h, c).definition)) return std::nullopt;
-                      return order_at_least(step_errors(v, h, c, Sampling::adaptive), 1.8);
+                      return order_at_least(step_errors(v, h, c, Mode::projection, Sampling::adaptive), 1.8);
                     });
   v.for_each_filter("4 control: the same across level jumps, lattice", [&](const EncodingCase& c) -> std::optional<Check> {
     if (c.filter != Filter::linear_lod) return std::nullopt;
-    return order_below(step_errors(v, h, c, Sampling::lattice), 1.7);
+    return order_below(step_errors(v, h, c, Mode::projection, Sampling::lattice), 1.7);
   });
 }
 
