@@ -156,9 +156,9 @@ void add_surfaces(const Scene& scene, const EncodedField& field, SceneBindings& 
   b.defines.emplace_back("AMRTEX_SHADING", iso.shading == Shading::gradient ? 1 : 0);
 }
 
-/// Cells of one level that may lie in a row: along the diagonal of its largest patch, or of the largest page.
+/// Cells of one level that may lie in a row in a region: along the diagonal of its largest patch, or of the largest page.
 double longest_run(const AmrHierarchy& h) {
-  double longest = 128 * std::sqrt(3.0);
+  double longest = std::min(128 * std::sqrt(3.0), glm::length(Vec3d(h.cells(h.finest_level()))));
   for (int l = 0; l < h.level_count(); ++l)
     for (const Patch& p : h.patches(l)) longest = std::max(longest, glm::length(Vec3d(p.box.size())));
   return longest;
