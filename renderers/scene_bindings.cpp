@@ -247,6 +247,32 @@ void require_detail(const EncodedField& field, const RenderSettings& s) {
     throw Error(fmt::format("level of detail: the structure of encoding {} was built without it", field.encoding));
 }
 
+/// Cells of one level that may lie in a row in a region: along the diagonal of its largest patch, or of the largest page.
+double longest_run(const AmrHierarchy& h) {
+  double longest = std::min(128 * std::sqrt(3.0), glm::length(Vec3d(h.cells(h.finest_level()))));
+  for (int l = 0; l < h.level_count(); ++l)
+    for (const Patch& p : h.patches(l)) longest = std::max(longest, glm::length(Vec3d(p.box.size())));
+  return longest;
+}
+
+/// Throws UsageError for what no picture can be made of, UnsupportedError for more steps than the loops count.
+void check_sampling(const AmrHierarchy& h, const Scene& scene) {
+  const double step = scene.settings.step;
+  if (!(step > 0) || !std::isfinite(step))
+    throw UsageError(fmt::format("step {}: accepted: a positive number of cell widths", step));
+  if (scene.region)
+    for (int a = 0; a < 3; ++a)
+      if (std::isnan((*scene.region)[0][a]) || std::isnan((*scene.region)[1][a]))
+        throw UsageError("region: a corner is no number; accepted: two corners in world units");
+  // lattice: samples of a ray are counted in 32 bits; adaptive: those of a region in a float's 24
+  const bool lattice = scene.settings.sampling == Sampling::lattice;
+  const double cells = lattice ? glm::length((h.domain_upper() - h.domain_lower()) / smallest_edge(h)) : longest_run(h);
+  const double most = lattice ? 0x1p31 : 0x1p24;
+  if (cells / step >= most)
+    throw UnsupportedError(fmt::format("step {}: {:.3g} samples of sampling {} may lie in a row; at most {:.3g} are counted",
+                                       step, cells / step, sampling_name(scene.settings.sampling), most));
+}
+
 /// What the shader draws: pictures of depth and normals have no volume.
 Mode shader_mode(const RenderSettings& s) { return s.mode == Mode::dvr_iso && !s.draws_volume() ? Mode::iso : s.mode; }
 
@@ -333,6 +359,7 @@ UniformValues field_uniforms(const AmrHierarchy& h, const EncodedField& field) {
 
 SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const Scene& scene) {
   const RenderSettings& s = scene.settings;
+  check_sampling(h, scene);
   const double unit = smallest_edge(h);
   SceneBindings b;
   b.uniforms = field_uniforms(h, field);

@@ -65,7 +65,7 @@ Accumulation empty_accumulation() {
   a.transmittance = real(1);
   a.sum = real(0);
   a.lost = real(0);
-  a.maximum = real(-3.0e38);
+  a.maximum = as_real(0xff800000u);  // minus infinity: no value is smaller
   a.below = -1;
   a.beyond = -1;
   a.crossing = false;

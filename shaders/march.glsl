@@ -292,10 +292,10 @@ int march_lattice_region(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(Regio
   return AMRTEX_ISOVALUES != 0 && a.crossing ? int(i) - 1 : next;
 }
 
-// 1 / v without infinities: a ray along a face never ends a region through it.
+// 1 / v without infinities: a ray along a face, or almost along it, never ends a region through it.
 vec3r safe_inverse(IN(vec3r) v) {
-  vec3r tiny = vec3r(equal(v, vec3r(0))) * real(1e-20);
-  return real(1) / (v + tiny);
+  vec3r sense = vec3r(greaterThanEqual(v, vec3r(0))) * real(2) - vec3r(1);
+  return sense / max(abs(v), vec3r(1e-20));
 }
 
 // Samples from `first` on for which the eight values about it hold; returns the first that needs others, or
@@ -477,7 +477,8 @@ real march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(
     return from;
   }
 #endif
-  real count = max(ceil(length * inverse_width / u_step - real(1e-4)), real(1));
+  // a float counts to 2^24: the host refuses smaller steps, and no loop is endless
+  real count = clamp(ceil(length * inverse_width / u_step - real(1e-4)), real(1), real(16777216));
   real interval = length / count;
   if (AMRTEX_CONSTANT_REGIONS) {
     ray_real first = begin + ray_real(interval * (from - real(0.5)));
@@ -508,26 +509,32 @@ real march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(
 
 void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
   vec3r direction = vec3r(ray.direction);
-  vec3r inverse = safe_inverse(direction);
+  bvec3 forward = greaterThan(ray.direction, ray_vec3(0));
+  ray_vec3 speed = abs(ray.direction);
+  // along an axis that it does not move on, a ray leaves through no face, wherever rounding put it
+  ray_vec3 still = ray_vec3(lessThan(speed, ray_vec3(1e-20))) * ray_real(1e30);
+  ray_vec3 inverse = ray_real(1) / max(speed, ray_vec3(1e-20));
   ray_real t = front.t;
   Position p = front.p;
   real part = front.part;
   bool more = true;
   do {
     Region r;
-    vec3r f = vec3r(0);
-    real length = real(0);
+    ray_vec3 f = ray_vec3(0);  // as exact as the ray: in a large region a float would lose whole finest cells
+    ray_real length = ray_real(0);
     bool skipped = true;
     do {  // the next region that can be seen: all lanes of a SIMD group then sample together
       bool inside = locate(p, r);
       front.t = t;
       front.p = p;
-      f = vec3r(p.cell - r.lower) + p.fraction;
-      vec3r exits = max(-f * inverse, (vec3r(r.upper - r.lower) - f) * inverse);
-      length = max(min(exits.x, min(exits.y, exits.z)), real(0));
-      ray_real next = t + ray_real(length);
+      f = ray_vec3(p.cell - r.lower) + ray_vec3(p.fraction);
+      ray_vec3 size = ray_vec3(r.upper - r.lower);
+      ray_vec3 ahead = ray_vec3(forward.x ? size.x - f.x : f.x, forward.y ? size.y - f.y : f.y, forward.z ? size.z - f.z : f.z);
+      ray_vec3 exits = ahead * inverse + still;
+      length = max(min(exits.x, min(exits.y, exits.z)), ray_real(0));
+      ray_real next = t + length;
       more = next < ray.length;
-      if (!more) length = real(max(ray.length - t, ray_real(0)));
+      if (!more) length = max(ray.length - t, ray_real(0));
       skipped = !inside || region_invisible(a, r);
       count_region(a, skipped);
       if (skipped) pass_region(a, inside, r, next);
@@ -537,7 +544,7 @@ void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
       p = leave_region(ray, r, t, bvec3(x, y, !x && !y));
       more = more && all(greaterThanEqual(p.cell, ivec3(0))) && all(lessThan(p.cell, u_domain_cells));
     } while (skipped && more);
-    if (!skipped && length > real(0)) front.part = march_adaptive_region(a, r, f, direction, length, front.t, part);
+    if (!skipped && length > ray_real(0)) front.part = march_adaptive_region(a, r, vec3r(f), direction, real(length), front.t, part);
     part = real(0.5);
   } while (more && !ray_stopped(a));
 }
@@ -570,7 +577,7 @@ vec4r missed_picture() {
 vec4r volume_picture(IN(Accumulation) a) {
   if (AMRTEX_MODE == AMRTEX_MODE_DVR) return vec4r(a.color, real(1) - a.transmittance);
   if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION) return vec4r(a.sum * u_length_unit, real(0), real(0), real(1));
-  return vec4r(a.maximum < real(-2.9e38) ? real(0) : a.maximum, real(0), real(0), real(1));
+  return vec4r(a.maximum < real(-3.4028235e38) ? real(0) : a.maximum, real(0), real(0), real(1));
 }
 
 // The picture's value for one ray.

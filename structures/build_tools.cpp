@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <cmath>
+#include <limits>
 
 namespace amrtex {
 
@@ -111,6 +112,25 @@ int common_ratio_shift(const AmrHierarchy& hierarchy) {
 
 }  // namespace
 
+namespace {
+
+/// Throws UnsupportedError where 32-bit floats cannot hold the values, or a linear filter their differences.
+void require_float_values(const Encoding& encoding, const AmrHierarchy& h, const BuildRequest& request) {
+  constexpr double kMost = std::numeric_limits<float>::max();
+  if (request.storage == Storage::r64f) return;  // of the CPU's double precision
+  for (int i = 0; i < request.field_count(); ++i) {
+    const FieldStatistics& s = h.statistics(request.field_at(i));
+    const bool linear = request.needs.filter != Filter::nearest;
+    if (s.max > kMost || s.min < -kMost || (linear && s.max - s.min > kMost))
+      throw UnsupportedError(
+          fmt::format("encoding {}: values from {:.3g} to {:.3g} with filter {}; accepted: magnitudes{} up to {:.3g}, what a "
+                      "32-bit float holds",
+                      encoding.name(), s.min, s.max, filter_name(request.needs.filter), linear ? " and differences" : "", kMost));
+  }
+}
+
+}  // namespace
+
 bool any_missing(const AmrHierarchy& hierarchy, const BuildRequest& request) {
   if (request.needs.everything) return true;
   for (int i = 0; i < request.field_count(); ++i)
@@ -127,6 +147,7 @@ EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy
                          const Json& parameters) {
   require_fields(encoding, hierarchy, request);
   require_level_of_detail(encoding, request.needs);
+  require_float_values(encoding, hierarchy, request);
   EncodedField field;
   field.encoding = encoding.name();
   field.build_parameters = parameters;

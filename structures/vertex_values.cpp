@@ -1,5 +1,6 @@
 #include "vertex_values.hpp"
 
+#include <array>
 #include <cmath>
 #include <map>
 #include <vector>
@@ -36,17 +37,25 @@ std::vector<int> holding_levels(const AmrHierarchy& h, int field, int level, con
   return holding;
 }
 
-/// Mean of the values of the 8 cells around a vertex; `cells` is their box.
-double mean_around(const Vec3i& vertex, const Box& cells, std::span<const double> values) {
+/// A mean taken about its first value, so that the mean of equal values is that value to the bit.
+struct MeanAboutFirst {
+  double first = kNone;
   double sum = 0;
   int n = 0;
-  for_each_cell({vertex - Vec3i(1), vertex + Vec3i(1)}, [&](const Vec3i& c) {
-    const double value = values[cells.offset(c)];
+
+  void add(double value) {
     if (std::isnan(value)) return;
-    sum += value;
-    ++n;
-  });
-  return n > 0 ? sum / n : kNone;
+    if (n++ == 0) first = value;
+    sum += value - first;
+  }
+  double value() const { return n > 0 ? first + sum / n : kNone; }
+};
+
+/// Mean of the values of the 8 cells around a vertex; `cells` is their box.
+double mean_around(const Vec3i& vertex, const Box& cells, std::span<const double> values) {
+  MeanAboutFirst mean;
+  for_each_cell({vertex - Vec3i(1), vertex + Vec3i(1)}, [&](const Vec3i& c) { mean.add(values[cells.offset(c)]); });
+  return mean.value();
 }
 
 /// Vertices of one level, all that a box of finer cells lies between.
@@ -66,12 +75,16 @@ struct CoarseVertices {
   /// The trilinear interpolant of a cell at a vertex of the finer level.
   double interpolate(const Vec3i& cell, const Vec3i& vertex) const {
     const Vec3d f = Vec3d(vertex - cell * ratio) / static_cast<double>(ratio);
+    double first = kNone;  // the sum is taken about it: constants are kept to the bit
     double sum = 0;
     for_each_cell({Vec3i(0), Vec3i(2)}, [&](const Vec3i& c) {
       const double w = (c.x != 0 ? f.x : 1 - f.x) * (c.y != 0 ? f.y : 1 - f.y) * (c.z != 0 ? f.z : 1 - f.z);
-      if (w > 0) sum += w * values[box.offset(cell + c)];
+      if (!(w > 0)) return;
+      const double value = values[box.offset(cell + c)];
+      if (std::isnan(first)) first = value;
+      sum += w * (value - first);
     });
-    return sum;
+    return first + sum;
   }
 };
 

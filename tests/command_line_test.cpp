@@ -147,7 +147,7 @@ Json one_point() { return with(small_experiment(), "encodings", {{{"name", "page
 // --- usage ---
 
 TEST_F(CommandLine, EveryCommandHasHelpWithAnExample) {
-  for (const std::string command : {"encodings", "doctor", "info", "generate", "convert", "sample", "render", "run", "report"}) {
+  for (const std::string command : {"encodings", "doctor", "info", "generate", "convert", "sample", "render", "run", "report", "verify"}) {
     const Result r = amrtex({command, "--help"});
     EXPECT_EQ(r.exit_code, 0) << command;
     EXPECT_THAT(r.out, HasSubstr("Example: amrtex " + command));
@@ -196,6 +196,26 @@ TEST_F(CommandLine, UnknownNamesNameTheAcceptedOnes) {
   expect_complaint(also("--parameter", "page_size=5"), 2, AllOf(HasSubstr("page_table"), HasSubstr("4, 8, 16, 32, 64 or 128")));
   expect_complaint(also("--parameter", "size=8"), 2, HasSubstr("page_size, centring"));
   expect_complaint(also("--parameter", "page_size"), 2, HasSubstr("NAME=VALUE"));
+}
+
+TEST_F(CommandLine, VerifyRefusesUnknownSuitesAndContexts) {
+  expect_complaint(amrtex({"verify", "--suite", "analytical"}), 2,
+                   AllOf(HasSubstr("'analytical'"), HasSubstr("analytic, convergence, stiff, extreme, geometry, differential")));
+  expect_complaint(amrtex({"verify", "--context", "vulkan"}), 2, AllOf(HasSubstr("vulkan"), HasSubstr("osmesa")));
+}
+
+TEST_F(CommandLine, VerifyWritesCasesAsJson) {
+  const Result r = amrtex({"verify", "--suite", "stiff", "--json", "--context", "osmesa"});
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.err, IsEmpty());
+  const Json json = Json::parse(r.out);
+  ASSERT_FALSE(json["cases"].empty());
+  for (const Json& c : json["cases"]) {
+    EXPECT_EQ(c["suite"], "stiff");
+    EXPECT_TRUE(c["pass"].get<bool>()) << c.dump();
+    for (const char* key : {"name", "encoding", "filter", "expected", "observed"}) EXPECT_TRUE(c.contains(key)) << key;
+  }
+  for (const Json& s : json["skipped"]) EXPECT_FALSE(s["reason"].get<std::string>().empty());
 }
 
 TEST_F(CommandLine, MissingDataIsSaidClearly) {

@@ -35,7 +35,7 @@ void for_each_case(const std::vector<std::size_t>& which, F&& f, ContextKind kin
   for (const std::size_t mesh : which)
     for (const EncodingCase& c : encoding_cases()) {
       SCOPED_TRACE(meshes()[mesh].name + ": " + c.name());
-      if (accepted(meshes()[mesh].hierarchy, c, {.context = kind})) f(meshes()[mesh].hierarchy, c);
+      if (accepted(meshes()[mesh].hierarchy, c, {.limits = handle_limits(kind)})) f(meshes()[mesh].hierarchy, c);
     }
 }
 
