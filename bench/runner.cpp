@@ -241,7 +241,7 @@ class Runner {
   }
 
   /// What the level of detail did: the picture against that of the same structure without it.
-  Json pruning_error(Built& built, Scene scene, const Picture& pruned) const {
+  Json pruning_error(const Built& built, Scene scene, const Picture& pruned) const {
     scene.settings.level_of_detail.reset();
     scene.settings.max_level.reset();
     const auto whole = make_consumer(*context_, *mesh_, built.field, *built.gpu, scene);

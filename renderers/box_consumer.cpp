@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "structures/error.hpp"
 
@@ -18,7 +19,7 @@ constexpr std::size_t kMostVertices = std::size_t{1} << 26;
 /// Slices are counted in floats.
 constexpr double kMostSlices = 1 << 23;
 /// What `mip` starts from: no sample.
-constexpr float kNoMaximum = -3.0e38F;
+constexpr float kNoMaximum = -std::numeric_limits<float>::infinity();
 
 [[noreturn]] void refuse(const RenderSettings& s, std::string_view reason) {
   throw UnsupportedError(fmt::format("consumer {}: {}", consumer_name(s.consumer), reason));
