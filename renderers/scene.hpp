@@ -113,8 +113,8 @@ struct RenderSettings {
   int height = 512;                 ///< pixels
   bool skip = true;                 ///< regions that the transfer function makes invisible are skipped
   std::optional<double> early_end;  ///< opacity at which a ray ends; off when absent
-  bool prune = false;       ///< what the transfer function hides is not even built (mode dvr); then it may not change
-  bool everything = false;  ///< structures hold also what the scene does not need, to see what leaving out saves
+  bool prune = false;               ///< what the transfer function hides is not even built (mode dvr); then it may not change
+  bool everything = false;          ///< structures hold also what the scene does not need, to see what leaving out saves
   Isosurfaces isosurfaces;
 
   bool draws_volume() const { return mode == Mode::dvr || (mode == Mode::dvr_iso && isosurfaces.output == Output::color); }
