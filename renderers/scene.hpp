@@ -138,8 +138,8 @@ struct RenderSettings {
   int height = 512;                 ///< pixels
   bool skip = true;                 ///< regions that the transfer function makes invisible are skipped
   std::optional<double> early_end;  ///< opacity at which a ray ends; off when absent
-  bool prune = false;       ///< what the transfer function hides is not even built (mode dvr); then it may not change
-  bool everything = false;  ///< structures hold also what the scene does not need, to see what leaving out saves
+  bool prune = false;               ///< what the transfer function hides is not even built (mode dvr); then it may not change
+  bool everything = false;          ///< structures hold also what the scene does not need, to see what leaving out saves
   Isosurfaces isosurfaces;
   std::optional<PointLight> point_light;  ///< absent: light of all places alike
   /// Refined cells are drawn themselves where they are smaller on the picture, pixels; off when absent.
