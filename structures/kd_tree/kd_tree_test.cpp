@@ -473,18 +473,24 @@ TEST(KdTree, TreesWithoutWrappingHoldTheSameField) {
   }
 }
 
+/// The whole mesh from an oblique side, values above 1/2 visible.
+Scene oblique_scene(const AmrHierarchy& h, int width, int height) {
+  Scene scene;
+  const Vec3d middle = (h.domain_lower() + h.domain_upper()) * 0.5;
+  scene.view.eye = middle + (h.domain_upper() - h.domain_lower()) * Vec3d(1.1, -1.7, 0.8);
+  scene.view.at = middle;
+  scene.transfer_function.extinction = {{0.5, 0}, {1, 20}};
+  scene.transfer_function.color = {{0, {1, 0.2, 0}}, {1, {0, 0.5, 1}}};
+  scene.settings.width = width;
+  scene.settings.height = height;
+  return scene;
+}
+
 TEST(KdTree, TraversalsGiveTheSamePicture) {
   Context& gl = context(ContextKind::egl);
   for (const MeshBuilder& mesh : {nested(waves), holes_and_missing(waves, 3)}) {
     const AmrHierarchy h = mesh.hierarchy();
-    Scene scene;
-    const Vec3d middle = (h.domain_lower() + h.domain_upper()) * 0.5;
-    scene.view.eye = middle + (h.domain_upper() - h.domain_lower()) * Vec3d(1.1, -1.7, 0.8);
-    scene.view.at = middle;
-    scene.transfer_function.extinction = {{0.5, 0}, {1, 20}};
-    scene.transfer_function.color = {{0, {1, 0.2, 0}}, {1, {0, 0.5, 1}}};
-    scene.settings.width = 60;
-    scene.settings.height = 48;
+    const Scene scene = oblique_scene(h, 60, 48);
     const auto draw = [&](const char* traversal, Filtering filtering) {
       const EncodedField field = kd_field(h, Filter::linear_lod, {{"traversal", traversal}}, {.filtering = filtering});
       const GpuField gpu(field, gl);
@@ -810,14 +816,7 @@ TEST_F(KdTreeBindlessOnGl, BytesAreWhatGlReports) {
 
 TEST_F(KdTreeBindlessOnGl, PicturesHaveThePoolsBits) {
   for (const AmrHierarchy& h : {many_subgrids(), holes_and_missing(waves, 3).hierarchy()}) {
-    Scene scene;
-    const Vec3d middle = (h.domain_lower() + h.domain_upper()) * 0.5;
-    scene.view.eye = middle + (h.domain_upper() - h.domain_lower()) * Vec3d(1.1, -1.7, 0.8);
-    scene.view.at = middle;
-    scene.transfer_function.extinction = {{0.5, 0}, {1, 20}};
-    scene.transfer_function.color = {{0, {1, 0.2, 0}}, {1, {0, 0.5, 1}}};
-    scene.settings.width = 80;
-    scene.settings.height = 60;
+    const Scene scene = oblique_scene(h, 80, 60);
     for (const Filter filter : {Filter::nearest, Filter::linear_lod, Filter::linear_vertex})
       for (const Filtering filtering : {Filtering::manual, Filtering::hardware}) {
         const auto draw = [&](const Json& parameters) {
