@@ -8,9 +8,11 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "octree_layout.h"
 #include "octree_mesh.hpp"
+#include "octree_windows.hpp"
 #include "structures/build_tools.hpp"
 
 namespace amrtex {
@@ -39,6 +41,10 @@ struct Tree {
   bool ghosts = false;
   int level_0_shift = 0;
   std::int64_t nodes = 0;
+  std::int64_t leaves = 0;                ///< slots of cells with a value
+  std::int64_t pruned = 0;                ///< nodes that are not stored because nothing reads them that can be seen
+  std::optional<VisibleParts> visible{};  ///< where it is asked for
+  const VisibleParts* stored_parts() const { return visible ? &*visible : nullptr; }
 };
 
 /// Nodes in a 3D texture: 2^shift.x by 2^shift.y by `layers`.
@@ -97,49 +103,79 @@ Tree place_tree(const AmrHierarchy& h, const BuildRequest& request) {
   return tree;
 }
 
+/// What lies below a node.
+struct Count {
+  std::int64_t nodes = 0, leaves = 0, pruned = 0;
+  void add(const Count& c) {
+    nodes += c.nodes;
+    leaves += c.leaves;
+    pruned += c.pruned;
+  }
+};
+
 /// A node of kSubtreeDepth: its subtree is counted and written by itself.
 struct Subtree {
   TreeCell cell;
-  std::int64_t nodes = 0;  ///< below it
+  Count below = {};
   std::int64_t index = 0;  ///< its own
   std::int64_t first = 0;  ///< of the nodes below it
 };
 
-std::int64_t count_below(TreeMesh& mesh, const TreeCell& node, std::int64_t most) {
-  std::int64_t n = 0;
-  for (int i = 0; i < 8 && n <= most; ++i) {
-    TreeCell child = node.child(i);
-    double value;
-    if (mesh.classify(child, value) == CellKind::inner) n += 1 + count_below(mesh, child, most - n);
-  }
-  return n;
-}
-
-/// Nodes above kSubtreeDepth; collects those at that depth.
-std::int64_t count_above(TreeMesh& mesh, const TreeCell& node, int depth, std::vector<Subtree>& subtrees) {
-  if (depth == kSubtreeDepth) {
-    subtrees.push_back({node, 0, 0, 0});
-    return 0;
-  }
+/// Nodes below a cell of the mesh, whether they are stored or not.
+std::int64_t nodes_below(TreeMesh& mesh, const TreeCell& node) {
   std::int64_t n = 0;
   for (int i = 0; i < 8; ++i) {
     TreeCell child = node.child(i);
     double value;
-    if (mesh.classify(child, value) == CellKind::inner) n += 1 + count_above(mesh, child, depth + 1, subtrees);
+    if (mesh.classify(child, value) == CellKind::inner) n += 1 + nodes_below(mesh, child);
   }
   return n;
 }
 
+/// What is below the node, through `below(child)` of the inner ones; stops soon after `most` nodes.
+template <class Below>
+Count count_children(TreeMesh& mesh, const TreeCell& node, std::int64_t most, Below&& below) {
+  Count n;
+  for (int i = 0; i < 8 && n.nodes <= most; ++i) {
+    TreeCell child = node.child(i);
+    double value;
+    const CellKind kind = mesh.stored(child, value);
+    if (kind == CellKind::inner) {
+      ++n.nodes;
+      n.add(below(child, most - n.nodes));
+    }
+    if (kind == CellKind::pruned) n.pruned += 1 + nodes_below(mesh, child);
+    n.leaves += kind == CellKind::leaf || kind == CellKind::hidden ? 1 : 0;
+  }
+  return n;
+}
+
+Count count_below(TreeMesh& mesh, const TreeCell& node, std::int64_t most) {
+  return count_children(mesh, node, most, [&](const TreeCell& c, std::int64_t rest) { return count_below(mesh, c, rest); });
+}
+
+/// What is above kSubtreeDepth; collects the nodes at that depth.
+Count count_above(TreeMesh& mesh, const TreeCell& node, int depth, std::vector<Subtree>& subtrees) {
+  if (depth < kSubtreeDepth)
+    return count_children(mesh, node, kMostNodes,
+                          [&](const TreeCell& c, std::int64_t) { return count_above(mesh, c, depth + 1, subtrees); });
+  subtrees.push_back({node});
+  return {};
+}
+
 std::vector<Subtree> count_nodes(const AmrHierarchy& h, int field, Tree& tree) {
   std::vector<Subtree> subtrees;
-  TreeMesh mesh(h, field, tree.ghosts);
-  tree.nodes = 1 + count_above(mesh, tree.root, 0, subtrees);
-  tbb::enumerable_thread_specific<TreeMesh> meshes([&] { return TreeMesh(h, field, tree.ghosts); });
+  TreeMesh mesh(h, field, tree.ghosts, tree.stored_parts());
+  Count all = count_above(mesh, tree.root, 0, subtrees);
+  tbb::enumerable_thread_specific<TreeMesh> meshes([&] { return TreeMesh(h, field, tree.ghosts, tree.stored_parts()); });
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, subtrees.size()), [&](const auto& range) {
     TreeMesh& own = meshes.local();
-    for (std::size_t i = range.begin(); i != range.end(); ++i) subtrees[i].nodes = count_below(own, subtrees[i].cell, kMostNodes);
+    for (std::size_t i = range.begin(); i != range.end(); ++i) subtrees[i].below = count_below(own, subtrees[i].cell, kMostNodes);
   });
-  for (const Subtree& s : subtrees) tree.nodes += s.nodes;
+  for (const Subtree& s : subtrees) all.add(s.below);
+  tree.nodes = 1 + all.nodes;
+  tree.leaves = all.leaves;
+  tree.pruned = all.pruned;
   return subtrees;
 }
 
@@ -168,7 +204,7 @@ class TreeWriter {
         plan_(plan),
         scale_(scale),
         stores_(stores),
-        mesh_(h, request.field, tree.ghosts),
+        mesh_(h, request.field, tree.ghosts, tree.stored_parts()),
         fills_(h, request.field),
         ghosts_(tree.ghosts),
         averages_(plan.lod_texture || plan.averages_in_slots) {}
@@ -183,7 +219,7 @@ class TreeWriter {
     for (int i = 0; i < 8; ++i) {
       const auto k = static_cast<std::size_t>(i);
       child[k] = node.child(i);
-      kind[k] = mesh_.classify(child[k], value[k]);
+      kind[k] = mesh_.stored(child[k], value[k]);
       if (kind[k] == CellKind::inner) mask |= 1U << i;
     }
     std::int64_t grandchild = next;
@@ -200,8 +236,11 @@ class TreeWriter {
         part = below(child[k], at, next);
         put_inner(8 * index + i, at, average(child[k], value[k], part, i));
         if (request_.needs.level_of_detail && part.volume > 0) put_valid(8 * index + i);
+      } else if (kind[k] == CellKind::pruned) {  // for filters an empty cell whose fill is the average
+        part = mean_below(child[k]);
+        put_cell(8 * index + i, CellKind::empty, average(child[k], value[k], part, i));
       } else {
-        if (kind[k] == CellKind::leaf) {
+        if (kind[k] == CellKind::leaf || kind[k] == CellKind::hidden) {
           const double volume = std::ldexp(1.0, 3 * child[k].shift);
           part = {value[k] * volume, volume};
         } else {
@@ -220,6 +259,9 @@ class TreeWriter {
                  [this](const TreeCell& c, std::int64_t at, std::int64_t& n) { return write_below(c, at, n); });
   }
 
+  /// Without what only pruned cells would have to be read for.
+  void skip_means(bool skip) { skip_means_ = skip; }
+
   void write_root_average(double mean) {
     if (plan_.lod_texture) put_lod(0, mean);
   }
@@ -235,6 +277,23 @@ class TreeWriter {
     const double v = fills_.at(level, mesh_.level_cell(first), octant);
     return std::isnan(v) ? 0 : v;
   }
+  /// What write() returns, of cells that are not written: the same sum in the same order.
+  Mean mean_below(const TreeCell& node) {
+    Mean mean;
+    if (!averages_ || skip_means_) return mean;
+    for (int i = 0; i < 8; ++i) {
+      TreeCell child = node.child(i);
+      double value;
+      const CellKind kind = mesh_.classify(child, value);
+      if (kind == CellKind::empty) continue;
+      const double volume = std::ldexp(1.0, 3 * child.shift);
+      const Mean part = kind == CellKind::inner ? mean_below(child) : Mean{value * volume, volume};
+      mean.sum += part.sum;
+      mean.volume += part.volume;
+    }
+    return mean;
+  }
+
   /// Level value of an inner child: the same rule and the same bits as everywhere (level_values.hpp); between
   /// and above levels the mean of what lies below.
   double average(const TreeCell& c, double stored, const Mean& below, int octant) {
@@ -309,6 +368,7 @@ class TreeWriter {
   NodeFills fills_;
   bool ghosts_;
   bool averages_;
+  bool skip_means_ = false;
 };
 
 /// Writes the nodes above the subtrees; `subtree(k, index, next)` stands for the k-th of these.
@@ -329,12 +389,14 @@ void write_tree(const AmrHierarchy& h, const BuildRequest& request, const Tree& 
     std::int64_t next = 1;
     return write_above(upper, tree.root, 0, 0, next, k, subtree);
   };
+  upper.skip_means(true);
   write_upper([&](std::size_t k, std::int64_t index, std::int64_t& next) {  // where each subtree goes
     subtrees[k].index = index;
     subtrees[k].first = next;
-    next += subtrees[k].nodes;
+    next += subtrees[k].below.nodes;
     return Mean{};
   });
+  upper.skip_means(false);
   std::vector<Mean> means(subtrees.size());
   tbb::enumerable_thread_specific<TreeWriter> writers([&] { return TreeWriter(h, request, tree, options, plan, scale, stores); });
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, subtrees.size()), [&](const auto& range) {
@@ -345,7 +407,7 @@ void write_tree(const AmrHierarchy& h, const BuildRequest& request, const Tree& 
     }
   });
   const Mean all = write_upper([&](std::size_t k, std::int64_t, std::int64_t& next) {  // once more, now that means are known
-    next += subtrees[k].nodes;
+    next += subtrees[k].below.nodes;
     return means[k];
   });
   upper.write_root_average(all.value());
@@ -440,43 +502,6 @@ void write_start_grid(const Tree& tree, const TreeReader& reader, const Plan& pl
 
 // ---- value ranges of linear_lod: one a node, of everything that its leaves can return
 
-/// Smallest and largest of each 3^3 values around a cell.
-class WindowRanges {
- public:
-  void read(const AmrHierarchy& h, int field, int level, const Box& box) {
-    wide_ = box.grown(1);
-    low_.resize(static_cast<std::size_t>(wide_.cells()));
-    filled_level_values(h, field, level, wide_, low_);
-    high_ = low_;
-    constexpr double kInfinity = std::numeric_limits<double>::infinity();
-    for (double& v : low_) v = std::isnan(v) ? kInfinity : v;
-    for (double& v : high_) v = std::isnan(v) ? -kInfinity : v;
-    const Vec3i n = wide_.size();
-    for (const std::size_t stride : {std::size_t{1}, static_cast<std::size_t>(n.x), static_cast<std::size_t>(n.x * n.y)}) {
-      spread(low_, stride, [](double a, double b) { return a < b ? a : b; });
-      spread(high_, stride, [](double a, double b) { return a > b ? a : b; });
-    }
-  }
-  void add_to(ValueRange& range, const Vec3i& cell) const {
-    const std::size_t i = wide_.offset(cell);
-    if (low_[i] > high_[i]) return;
-    range.add(low_[i]);
-    range.add(high_[i]);
-  }
-
- private:
-  /// The best of three along one axis. Across the array's ends this is wrong; those cells are not read.
-  template <class Best>
-  void spread(std::vector<double>& v, std::size_t stride, Best&& best) {
-    next_ = v;
-    for (std::size_t i = stride; i + stride < v.size(); ++i) next_[i] = best(v[i], best(v[i - stride], v[i + stride]));
-    v.swap(next_);
-  }
-
-  Box wide_;
-  std::vector<double> low_, high_, next_;
-};
-
 /// Calls f(node, cells) for each node that has children among the cells of the box (space of the level of width 2^shift).
 template <class F>
 void for_each_node_of(const Tree& tree, const TreeReader& reader, int shift, const Box& box, F&& f) {
@@ -492,21 +517,6 @@ void for_each_node_of(const Tree& tree, const TreeReader& reader, int shift, con
     const Vec3i lower(child - origin);
     f(node, intersection({lower, lower + Vec3i(2)}, box));
   });
-}
-
-/// Parts of the patches of a level, small enough for arrays over one.
-struct PatchPart {
-  std::size_t patch;
-  Box box;
-};
-std::vector<PatchPart> patch_parts(std::span<const Patch> patches) {
-  constexpr int kEdge = 32;
-  std::vector<PatchPart> parts;
-  for (std::size_t k = 0; k < patches.size(); ++k)
-    for_each_cell(patches[k].box.coarsened(kEdge), [&](const Vec3i& i) {
-      parts.push_back({k, intersection({i * kEdge, (i + Vec3i(1)) * kEdge}, patches[k].box)});
-    });
-  return parts;
 }
 
 /// Boxes of cells of a level that finer patches lie on, whether a patch of the level stores them or not.
@@ -617,6 +627,19 @@ void require_shared_tree(const AmrHierarchy& h, const BuildRequest& request, con
           h.fields()[static_cast<std::size_t>(request.field_at(i))], h.statistics(request.field_at(i)).cells_without_value));
 }
 
+/// Nodes may go where only the volume is drawn, by its own filter.
+void require_prunable(const BuildRequest& request, const Options& o) {
+  if (request.needs.level_of_detail)
+    throw UnsupportedError(
+        "encoding octree: prune with a level of detail: an inner cell may show what none of its leaves does; accepted: one of "
+        "both");
+  if (o.paper_layout && o.store_gradients && request.needs.gradients)
+    throw UnsupportedError(
+        "encoding octree: prune with layout rgba8 and stored gradients: a gradient is interpolated between leaves that the "
+        "filter "
+        "does not read, and they would be gone; accepted: gradients computed, or layout wide");
+}
+
 class Octree final : public Encoding {
  public:
   std::string_view name() const override { return "octree"; }
@@ -630,6 +653,7 @@ class Octree final : public Encoding {
   void check_parameters(const Json& parameters) const override { options(parameters); }
   Support supported(const ContextInfo&) const override { return {}; }
   Support level_of_detail() const override { return {}; }
+  bool prunes() const override { return true; }
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
@@ -678,6 +702,7 @@ void Octree::require_support(const AmrHierarchy& h, const BuildRequest& request,
     throw UnsupportedError(
         "encoding octree: no level of detail with layout rgba8: the word of an inner node has no room for a gradient, nor to say "
         "whether it has a value; accepted: layout wide");
+  if (!request.needs.invisible.empty()) require_prunable(request, o);
   if (request.field_count() > 1) require_shared_tree(h, request, o);
   if (o.paper_traversal && o.start_grid > 0)
     throw UnsupportedError(
@@ -735,7 +760,7 @@ Plan Octree::plan(const AmrHierarchy& h, const BuildRequest& request, const Opti
         fmt::format("encoding octree: {} nodes or more, an address of {} bits tells at most {} apart ({} leaf cells fit)",
                     tree.nodes, AMRTEX_OCTREE_INDEX_BITS, kMostNodes, 7 * kMostNodes + 1));
   Plan p;
-  p.validity = any_missing(h, request) && !o.paper_layout;
+  p.validity = (any_missing(h, request) || tree.pruned > 0) && !o.paper_layout;
   plan_stores(request, o, tree, p);
   const Vec3l texture(p.texture.nodes());
   const std::int64_t in_texture = texture.x * texture.y * texture.z;
@@ -802,6 +827,7 @@ Json statistics(const Tree& tree, const Plan& p, const Counts& counts) {
   json["depths"] = tree.root.shift;
   json["leaves"] = counts.leaves;
   json["empty"] = counts.empty;
+  json["pruned_nodes"] = tree.pruned;
   json["start_grid"] = p.start_cells() > 0 ? Json{p.start.x, p.start.y, p.start.z} : Json(nullptr);
   json["start_grid_cells"] = p.start_cells();
   return json;
@@ -817,13 +843,26 @@ void add_shader_inputs(const Options& o, const Plan& p, const Tree& tree, Encode
   defines.emplace_back("AMRTEX_OCTREE_START", p.start_cells() > 0 ? 1 : 0);
   defines.emplace_back("AMRTEX_OCTREE_START_SHIFT", p.start_shift);
   defines.emplace_back("AMRTEX_OCTREE_GHOSTS", tree.ghosts ? 1 : 0);
+  defines.emplace_back("AMRTEX_OCTREE_PRUNED", tree.pruned > 0 ? 1 : 0);
   field.integer_uniforms.emplace_back("u_octree_shift", p.texture.shift);
   if (p.start_cells() > 0) field.integer_uniforms.emplace_back("u_octree_start", p.start);
 }
 
-std::vector<LeftOut> left_out(const BuildRequest& request, const Options& o, const Tree& tree, const Plan& p, bool missing) {
+/// Bytes that one node more would take.
+std::int64_t node_bytes(const BuildRequest& request, const Options& o, const Plan& p) {
+  const std::int64_t value_bytes = std::int64_t{request.field_count()} * texel_bytes(request.storage);
+  std::int64_t bytes = o.paper_layout ? 8 * 4 : 4 + 8 * value_bytes;
+  if (p.lod_texture) bytes += value_bytes;
+  if (p.ranges) bytes += 4;
+  return bytes;
+}
+
+std::vector<LeftOut> left_out(const BuildRequest& request, const Options& o, const Tree& tree, const Plan& p) {
   const bool linear = request.needs.filter != Filter::nearest;
   std::vector<LeftOut> list;
+  if (tree.pruned > 0)  // what is left then needs bits
+    list.push_back({"nodes", "no filter reads them where something can be seen",
+                    tree.pruned * node_bytes(request, o, p) - (o.paper_layout ? 0 : tree.nodes)});
   if (o.paper_layout && !request.needs.gradients)
     list.push_back({"gradients", "no surface is lit; their two channels stay empty", 0});
   if (!p.lod_texture)
@@ -831,7 +870,7 @@ std::vector<LeftOut> left_out(const BuildRequest& request, const Options& o, con
                     p.averages_in_slots ? "the averages stand in the texels that inner children leave unused"
                                         : "the filter nearest reads no averages",
                     tree.nodes * texel_bytes(request.storage)});
-  if (!missing) list.push_back({"validity bits", "every cell has a value", tree.nodes});
+  if (!p.validity && !o.paper_layout) list.push_back({"validity bits", "every cell has a value", tree.nodes});
   if (linear && !p.ranges) list.push_back({"value ranges", "no region is skipped", 4 * tree.nodes});
   return list;
 }
@@ -841,6 +880,7 @@ EncodedField Octree::build(const AmrHierarchy& h, const BuildRequest& request) c
   const Options o = options(parameters);
   require_support(h, request, o);
   Tree tree = place_tree(h, request);
+  if (!request.needs.invisible.empty()) tree.visible.emplace(h, request, tree.root, tree.ghosts);
   std::vector<Subtree> subtrees = count_nodes(h, request.field, tree);
   const Plan p = plan(h, request, o, tree);
 
@@ -853,22 +893,22 @@ EncodedField Octree::build(const AmrHierarchy& h, const BuildRequest& request) c
   const bool gradients = o.paper_layout && o.store_gradients && request.needs.gradients;
   if (gradients) write_gradients(h, request, tree, reader, stores.nodes);
   if (p.ranges) write_ranges(h, request, tree, reader, field, stores.ranges);
-  const std::int64_t leaves = h.leaf_cells() - h.statistics(request.field).cells_without_value;
-  const Counts counts{leaves, tree.nodes - 1, 7 * tree.nodes + 1 - leaves};
+  const Counts counts{tree.leaves, tree.nodes - 1, 7 * tree.nodes + 1 - tree.leaves};
   set_roles(o, tree, p, counts, stores);
   for (HostTexture& t : more) {  // as those of the first field
     t.holds_values = t.name.starts_with("tex_octree_values");
     t.roles = (t.holds_values ? stores.values : stores.lod).roles;
   }
   field.statistics = statistics(tree, p, counts);
-  field.left_out = left_out(request, o, tree, p, any_missing(h, request));
+  field.left_out = left_out(request, o, tree, p);
   add_shader_inputs(o, p, tree, field);
   field.shader.defines.emplace_back("AMRTEX_OCTREE_GRADIENTS", gradients ? 1 : 0);
   for (HostTexture* t :
        {&stores.nodes, &stores.values, &stores.lod, &stores.validity, &stores.start, &stores.start_slots, &stores.ranges})
     if (!t->data.empty()) field.textures.push_back(std::move(*t));
   for (HostTexture& t : more) field.textures.push_back(std::move(t));
-  const std::int64_t working = p.ranges ? tree.nodes * static_cast<std::int64_t>(sizeof(ValueRange)) : 0;
+  std::int64_t working = p.ranges ? tree.nodes * static_cast<std::int64_t>(sizeof(ValueRange)) : 0;
+  if (tree.visible) working += tree.visible->host_bytes();
   field.host_peak_bytes = field.memory().total() + working + static_cast<std::int64_t>(subtrees.size() * sizeof(Subtree));
   return field;
 }

@@ -25,6 +25,9 @@
 #ifndef AMRTEX_OCTREE_GHOSTS
 #error AMRTEX_OCTREE_GHOSTS must be defined: 1 where missing neighbours stand in the tree, 0 where there are none
 #endif
+#ifndef AMRTEX_OCTREE_PRUNED
+#error AMRTEX_OCTREE_PRUNED must be defined: 1 where nodes that show nothing are not stored, else 0
+#endif
 #ifndef AMRTEX_OCTREE_GRADIENTS
 #error AMRTEX_OCTREE_GRADIENTS must be defined: 1 where leaves hold the direction of their gradient, else 0
 #endif
@@ -38,6 +41,10 @@ DEFINE_INT(AMRTEX_OCTREE_LOD)
 DEFINE_INT(AMRTEX_OCTREE_START)
 DEFINE_INT(AMRTEX_OCTREE_START_SHIFT)
 DEFINE_INT(AMRTEX_OCTREE_GHOSTS)
+DEFINE_INT(AMRTEX_OCTREE_PRUNED)
+
+// slots may hold no cell, one without a value, or one that shows nothing
+#define AMRTEX_OCTREE_EMPTY_SLOTS (AMRTEX_VALIDITY != 0 || AMRTEX_OCTREE_PRUNED != 0)
 
 // what the march may use (contract.glsl); the paper's traversal pays its eight descents every sample
 #define AMRTEX_CELL_REGIONS (AMRTEX_OCTREE_TRAVERSAL == AMRTEX_OCTREE_FAST)
@@ -71,8 +78,8 @@ UNIFORM(ivec3, u_octree_start)  // cells of the start grid
 #if AMRTEX_CPP || (AMRTEX_OCTREE_START && (AMRTEX_FILTER != AMRTEX_FILTER_NEAREST || AMRTEX_LEVEL_OF_DETAIL) && !AMRTEX_OCTREE_LOD)
 BUFFER(uint, octree_start_slots, octree_start_slots_block)  // where the average of each cell of the start grid stands
 #endif
-#if AMRTEX_CPP || (AMRTEX_VALIDITY && AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_WIDE)
-BUFFER(uint, octree_validity, octree_validity_block)  // one bit a slot: a leaf (or what may be drawn in its place) with a value
+#if AMRTEX_CPP || (AMRTEX_OCTREE_EMPTY_SLOTS && AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_WIDE)
+BUFFER(uint, octree_validity, octree_validity_block)  // one bit a slot: a leaf (or what may be drawn in its place) with a value that may show
 #endif
 #if AMRTEX_CPP || (AMRTEX_VALUE_RANGES && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST)
 BUFFER(uint, octree_ranges, octree_ranges_block)  // one code a node: of all that its leaves can return
@@ -195,7 +202,7 @@ int octree_level(IN(int) shift) {
 
 bool octree_has_value(IN(int) slot) {
   if (AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_RGBA8) return (octree_word(slot) >> 24u) == uint(AMRTEX_OCTREE_LEAF);
-#if AMRTEX_CPP || (AMRTEX_VALIDITY && AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_WIDE)
+#if AMRTEX_CPP || (AMRTEX_OCTREE_EMPTY_SLOTS && AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_WIDE)
   return ((octree_validity[slot >> 5] >> uint(slot & 31)) & 1u) != 0u;
 #endif
   return true;
@@ -296,7 +303,7 @@ bool locate(IN(Position) p, OUT(Region) r) {
   r.value_range = vec2r(0);
   r.handle = ivec4(slot >> 3, shift, node, node >= 0 ? 1 : 0);
   bool inside = true;
-  if (AMRTEX_VALIDITY != 0) {
+  if (AMRTEX_OCTREE_EMPTY_SLOTS) {
     inside = octree_has_value(slot);
     if (!inside) octree_empty_region(c, shift, r);
   }
@@ -385,7 +392,7 @@ void octree_stencil(IN(Region) r, IN(int) field, IN(ivec3) octant, OUT(Stencil) 
     }
     for (int i = 0; i < 8; ++i) {
       v[i] = octree_depth_value(slot[i], node[i], inner[i], field);
-      if (AMRTEX_VALIDITY != 0) {
+      if (AMRTEX_OCTREE_EMPTY_SLOTS) {
         if (same[i]) same[i] = octree_has_value(slot[i]);
       }
       bool outside = ((i & 1) != 0 ? behind.x : before.x) || ((i & 2) != 0 ? behind.y : before.y) || ((i & 4) != 0 ? behind.z : before.z);

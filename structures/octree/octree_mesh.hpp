@@ -6,34 +6,27 @@
 #include <cmath>
 #include <vector>
 
+#include "octree_cell.hpp"
 #include "structures/amr_hierarchy.hpp"
 #include "structures/level_values.hpp"
+#include "visible_parts.hpp"
 
 namespace amrtex {
 
-using Vec3l = glm::vec<3, std::int64_t>;  // finest cells where 31 bits may be passed
-
-/// A cell of the tree: a cube of 2^shift finest cells.
-struct TreeCell {
-  Vec3l lower{0};  ///< finest; negative before the domain
-  int shift = 0;
-  /// Nothing in it has a value: it is divided for the sake of its neighbours' fills.
-  bool missing = false;
-
-  TreeCell child(int octant) const {
-    const std::int64_t half = std::int64_t{1} << (shift - 1);
-    return {lower + Vec3l(octant & 1, (octant >> 1) & 1, octant >> 2) * half, shift - 1, missing};
-  }
+enum class CellKind : std::uint8_t {
+  empty,
+  inner,
+  leaf,
+  hidden,  ///< a leaf that shows nothing, stored since one beside it reads it
+  pruned   ///< an inner cell below which nothing is stored
 };
-
-enum class CellKind : std::uint8_t { empty, inner, leaf };
 
 /// Answers what a cell of the tree is. One object a thread: it remembers the patch that it found last on each level.
 class TreeMesh {
  public:
-  /// `ghosts`: missing cells are divided as far as the leaves beside them.
-  TreeMesh(const AmrHierarchy& h, int field, bool ghosts)
-      : hierarchy_(h), field_(static_cast<std::size_t>(field)), ghosts_(ghosts), holes_(h.has_holes()) {
+  /// `ghosts`: missing cells are divided as far as the leaves beside them. `visible`: what is stored, null: everything.
+  TreeMesh(const AmrHierarchy& h, int field, bool ghosts, const VisibleParts* visible)
+      : hierarchy_(h), visible_(visible), field_(static_cast<std::size_t>(field)), ghosts_(ghosts), holes_(h.has_holes()) {
     level_.fill(-1);
     last_patch_.assign(static_cast<std::size_t>(h.level_count()), -1);
     for (int l = 0; l < h.level_count(); ++l) level_[static_cast<std::size_t>(shift_of(l))] = l;
@@ -45,7 +38,19 @@ class TreeMesh {
   int level_at(int shift) const { return level_[static_cast<std::size_t>(shift)]; }
   Vec3i level_cell(const TreeCell& c) const { return Vec3i(c.lower >> static_cast<std::int64_t>(c.shift)); }
 
-  /// What the cell is; sets its `missing`, and `value` to the level value that the mesh stores (NaN: none).
+  /// What the cell is in the tree that is stored: classify(), less what cannot be seen.
+  CellKind stored(TreeCell& c, double& value) {
+    const CellKind kind = classify(c, value);
+    if (visible_ == nullptr) return kind;
+    if (kind == CellKind::inner && !visible_->keeps(c)) return CellKind::pruned;
+    if (kind != CellKind::leaf) return kind;
+    const int level = level_at(c.shift);
+    const int patch = last_patch_[static_cast<std::size_t>(level)];
+    const Box& box = hierarchy_.patches(level)[static_cast<std::size_t>(patch)].box;
+    return visible_->shows(level, patch, box.offset(level_cell(c))) ? CellKind::leaf : CellKind::hidden;
+  }
+
+  /// What the cell is in the mesh; sets its `missing`, and `value` to the level value that the mesh stores (NaN: none).
   CellKind classify(TreeCell& c, double& value) {
     value = std::numeric_limits<double>::quiet_NaN();
     if (c.missing || outside(c)) return missing(c);
@@ -99,6 +104,7 @@ class TreeMesh {
   }
 
   const AmrHierarchy& hierarchy_;
+  const VisibleParts* visible_;
   std::size_t field_;
   bool ghosts_, holes_;
   std::array<int, 34> level_{};

@@ -4,12 +4,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <bit>
+
 #include "renderers/raycaster.hpp"
 #include "renderers/scene_bindings.hpp"
 #include "shaders/shader_library.hpp"
 #include "structures/octree/octree_layout.h"
+#include "structures/random_mesh.hpp"
 #include "structures/synthetic.hpp"
-#include "tests/encoding_cases.hpp"
+#include "tests/pictures.hpp"
 
 namespace amrtex {
 namespace {
@@ -320,7 +323,7 @@ TEST(Octree, ValidityIsKeptOnlyWhereCellsAreMissing) {
   EXPECT_EQ(field.find("octree_validity")->texels(), (field.statistics["nodes"].get<std::int64_t>() * 8 + 31) / 32);
 }
 
-// ---- refusals
+// ---- pruning
 
 template <class E>
 std::string refusal(const AmrHierarchy& h, const BuildRequest& request) {
@@ -331,6 +334,151 @@ std::string refusal(const AmrHierarchy& h, const BuildRequest& request) {
     return e.what();
   }
 }
+
+/// Intervals of values for BuildOptions::invisible: all up to `last`.
+std::vector<std::array<double, 2>> invisible_up_to(double last) { return {{-3e38, last}}; }
+
+/// 8^3 cells of one level; 1 in one of them, 0 elsewhere.
+AmrHierarchy one_cell(const Vec3i& cell) {
+  const MeshBuilder mesh(Vec3i(8));
+  const Vec3d centre = mesh.centre(0, cell);
+  return MeshBuilder(Vec3i(8)).root([=](const Vec3d& p) { return p == centre ? 1.0 : 0.0; }).hierarchy();
+}
+
+TEST(Octree, PruningLeavesTheNodesThatAFilterReadsAboutWhatShows) {
+  const auto nodes = [](const Vec3i& cell, Filter filter, const BuildOptions& options) {
+    const EncodedField field = octree_field(one_cell(cell), filter, {{"start_grid", 0}}, options);
+    EXPECT_EQ(field.statistics["nodes"].get<int>() + field.statistics["pruned_nodes"].get<int>(), 1 + 8 + 64);
+    return field.statistics["nodes"].get<int>();
+  };
+  const BuildOptions pruned{.invisible = invisible_up_to(0.5)};
+  EXPECT_EQ(nodes({0, 0, 0}, Filter::nearest, {}), 73);
+  // the way to the cell: the root, a node of 4^3 cells, one of 2^3
+  EXPECT_EQ(nodes({0, 0, 0}, Filter::nearest, pruned), 1 + 1 + 1);
+  EXPECT_EQ(nodes({3, 3, 3}, Filter::nearest, pruned), 1 + 1 + 1);
+  // cells 0 and 1 of each axis show something; they read 0 to 2: 2^3 nodes of 2^3 cells, all in one of 4^3
+  EXPECT_EQ(nodes({0, 0, 0}, Filter::linear_lod, pruned), 1 + 1 + 8);
+  // cells 2 to 4 do; they read 1 to 5: 3^3 nodes of 2^3 cells, in all 2^3 of 4^3
+  EXPECT_EQ(nodes({3, 3, 3}, Filter::linear_lod, pruned), 1 + 8 + 27);
+  EXPECT_EQ(nodes({3, 3, 3}, Filter::linear_lod, {.invisible = invisible_up_to(2)}), 1);
+}
+
+TEST(Octree, PruningStoresTheAverageInPlaceOfASubtree) {
+  // root cells of 10 x, the corner of 4^3 of them refined; what shows lies at the upper end of x
+  const AmrHierarchy h = MeshBuilder(Vec3i(8), {2})
+                             .root([](const Vec3d& p) { return p.x; })
+                             .patch(1, {Vec3i(0), Vec3i(8)}, [](const Vec3d& p) { return 10 + p.x; })
+                             .hierarchy();
+  // leaves of level 0 that show something: cells 4 to 7 along x; those of x = 4 read averages of the patch behind their face
+  for (const char* traversal : {"fast", "paper"}) {
+    const EncodedField whole = octree_field(h, Filter::linear_lod, {{"traversal", traversal}});
+    const EncodedField pruned =
+        octree_field(h, Filter::linear_lod, {{"traversal", traversal}}, {.invisible = {{0.0, 0.4}, {9.9, 11.0}}});
+    EXPECT_GT(pruned.statistics["pruned_nodes"], 0);
+    for (const double x : {0.1, 0.4, 0.9})
+      for (const Vec3i cell : {Vec3i(8, 3, 3), Vec3i(8, 8, 7), Vec3i(11, 12, 1)})
+        EXPECT_EQ(value_at(h, pruned, cell, {x, 0.3, 0.6}), value_at(h, whole, cell, {x, 0.3, 0.6})) << traversal;
+  }
+}
+
+TEST(Octree, PruningFindsNothingInPlacesThatShowNothing) {
+  const AmrHierarchy h = one_cell({3, 3, 3});
+  for (const char* layout : {"wide", "rgba8"}) {
+    const Storage storage = std::string_view(layout) == "wide" ? Storage::r32f : Storage::r8;
+    const EncodedField field =
+        octree_field(h, Filter::nearest, {{"layout", layout}}, {.storage = storage, .invisible = invisible_up_to(0.5)});
+    EXPECT_EQ(value_at(h, field, {3, 3, 3}, Vec3d(0.5)), 1.0);
+    EXPECT_TRUE(std::isnan(value_at(h, field, {2, 3, 3}, Vec3d(0.5))));  // a leaf beside it, in its node
+    EXPECT_TRUE(std::isnan(value_at(h, field, {7, 7, 7}, Vec3d(0.5))));  // in a subtree that is gone
+  }
+}
+
+/// Opaque from the middle of the field's values on.
+Scene upper_half(const AmrHierarchy& h, bool skip) {
+  const FieldStatistics& s = h.statistics(0);
+  const double middle = 0.6 * s.min + 0.4 * s.max;
+  Scene scene;
+  scene.view = perspective(h.domain_upper() + (h.domain_upper() - h.domain_lower()) * Vec3d(1.2, 0.9, 0.6),
+                           (h.domain_lower() + h.domain_upper()) / 2.0);
+  scene.settings.sampling = Sampling::lattice;
+  scene.settings.skip = skip;
+  scene.settings.width = scene.settings.height = 24;
+  scene.transfer_function.extinction = {{middle, 0}, {s.max, 20}};
+  scene.transfer_function.color = {{s.min, {0, 0, 0.3}}, {s.max, {0.8, 0.5, 0}}};
+  return scene;
+}
+
+/// Every layout and traversal, with and without a start grid, as built with and without ranges.
+template <class F>
+void for_each_pruned(const AmrHierarchy& h, F&& f) {
+  for (const Filter filter : {Filter::nearest, Filter::linear_lod})
+    for (const Json& parameters : {Json::object(), Json{{"start_grid", 0}}, Json{{"traversal", "paper"}},
+                                   Json{{"layout", "rgba8"}}, Json{{"layout", "rgba8"}, {"traversal", "paper"}}})
+      for (const bool skip : {true, false}) {
+        SCOPED_TRACE(fmt::format("{} {} skip {}", filter_name(filter), parameters.dump(), skip));
+        const Scene scene = upper_half(h, skip);
+        BuildOptions options{.storage = parameters.contains("layout") ? Storage::r8 : Storage::r32f, .value_ranges = skip};
+        const EncodedField whole = octree_field(h, filter, parameters, options);
+        options.invisible = {{-3e38, scene.transfer_function.extinction.front().value - 1e-5}};
+        f(scene, whole, octree_field(h, filter, parameters, options));
+      }
+}
+
+TEST(Octree, PruningLeavesThePictureTheSameToTheBit) {
+  const AmrHierarchy meshes[] = {
+      AmrHierarchy(generate_mesh(Json::parse(R"({"field": "blobs_shell", "levels": 3, "root": 16, "patch": 4})"))),
+      nested(waves).hierarchy(),
+      nested(waves, {4, 2}).hierarchy(),
+      jump_of_two(waves).hierarchy(),
+      holes_and_missing(waves).hierarchy(),
+      holes_and_missing(waves, 4).hierarchy()};
+  for (const AmrHierarchy& h : meshes) {
+    std::int64_t gone = 0;
+    for_each_pruned(h, [&](const Scene& scene, const EncodedField& whole, const EncodedField& pruned) {
+      const Picture picture = render_on_cpu(h, whole, scene, false);
+      EXPECT_GT(largest(picture), 0.1);
+      EXPECT_EQ(difference(picture, render_on_cpu(h, pruned, scene, false)), 0);
+      gone += pruned.statistics["pruned_nodes"].get<std::int64_t>();
+    });
+    EXPECT_GT(gone, 0) << "nothing was pruned: this tests nothing";
+  }
+}
+
+// Whether skipping is on or not, and whatever lies about: a hidden place is found nowhere, a visible one is what it was.
+TEST(Octree, PruningLeavesWhatShowsAloneOnRandomMeshes) {
+  std::int64_t gone = 0;
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    const AmrHierarchy h(random_mesh(seed));
+    bool powers = true;
+    for (int l = 0; l < h.finest_level(); ++l) powers = powers && std::has_single_bit(static_cast<unsigned>(h.ratio_to_finer(l)));
+    if (!powers || h.statistics(0).min >= h.statistics(0).max) continue;
+    SCOPED_TRACE(seed);
+    for_each_pruned(h, [&](const Scene& scene, const EncodedField& whole, const EncodedField& pruned) {
+      EXPECT_EQ(difference(render_on_cpu(h, whole, scene, false), render_on_cpu(h, pruned, scene, false)), 0);
+      gone += pruned.statistics["pruned_nodes"].get<std::int64_t>();
+    });
+  }
+  EXPECT_GT(gone, 0);
+}
+
+TEST(Octree, PruningIsRefusedWhereGradientsOrAveragesReadFurther) {
+  const AmrHierarchy h = one_cell({3, 3, 3});
+  const auto complaint = [&](const Json& parameters, const auto& need) {
+    BuildRequest request;
+    request.storage = Storage::r8;
+    request.parameters = parameters;
+    request.needs.invisible = invisible_up_to(0.5);
+    need(request.needs);
+    return refusal<UnsupportedError>(h, request);
+  };
+  const auto lit = [](SceneNeeds& n) { n.gradients = true; };
+  EXPECT_THAT(complaint({{"layout", "rgba8"}}, lit), AllOf(HasSubstr("prune"), HasSubstr("gradients"), HasSubstr("wide")));
+  EXPECT_EQ(complaint({{"layout", "rgba8"}, {"gradients", "computed"}}, lit), "built");
+  EXPECT_THAT(complaint(Json::object(), [](SceneNeeds& n) { n.level_of_detail = true; }),
+              AllOf(HasSubstr("prune"), HasSubstr("level of detail")));
+}
+
+// ---- refusals
 
 TEST(Octree, RefusesWithNumbersAndWhatIsAccepted) {
   const AmrHierarchy h = refined_corner();
