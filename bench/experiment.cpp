@@ -102,9 +102,10 @@ class Parser {
 
  private:
   void accept_root_keys() const {
-    Names keys = {"name",      "datasets", "encodings",         "filters", "storage",  "filtering",
-                  "render",    "views",    "transfer_function", "frames",  "warm_up",  "seed",
-                  "reference", "context",  "memory_limit",      "check",   "baseline", "explain_error"};
+    Names keys = {"name",      "datasets", "encodings",     "filters",           "storage",
+                  "filtering", "render",   "views",         "transfer_function", "frames",
+                  "warm_up",   "seed",     "reference",     "context",           "memory_limit",
+                  "check",     "baseline", "explain_error", "explain_left_out"};
     if (scene_) keys.push_back("region");
     root_.accept_keys(keys);
   }
@@ -586,6 +587,7 @@ class Parser {
       if (experiment_.explain_error && !experiment_.reference)
         explain->fail("a picture without a reference has no error to explain");
     }
+    if (const auto explain = root_.find("explain_left_out")) experiment_.explain_left_out = explain->boolean();
     if (const auto region = root_.find("region")) parse_region(*region);
   }
 
@@ -712,23 +714,25 @@ Json point_configuration(const Experiment& experiment, const BuildPoint& build, 
     reference = {{"step", experiment.reference->step}, {"filter", common ? filter_name(*common) : "own"}};
     if (experiment.explain_error) reference["explain"] = true;  // absent elsewhere: older records keep their names
   }
-  return {{"experiment", experiment.name},
-          {"dataset", dataset_hash},
-          {"encoding", build.encoding},
-          {"build_parameters", build.parameters},
-          {"filter", filter_name(build.filter)},
-          {"storage", format_name(build.storage)},
-          {"filtering", filtering_name(build.filtering)},
-          {"render", unnamed_render_json(render)},
-          {"region", region},
-          {"frames", render.frames},
-          {"warm_up", render.warm_up},
-          {"seed", experiment.seed},
-          {"reference", reference},
-          {"baseline", experiment.baseline},
-          {"context", experiment.context},
-          {"memory_limit", experiment.memory_limit ? Json(*experiment.memory_limit) : Json()},
-          {"minimum_psnr_db", json_or_null(experiment.minimum_psnr_db)}};
+  Json configuration = {{"experiment", experiment.name},
+                        {"dataset", dataset_hash},
+                        {"encoding", build.encoding},
+                        {"build_parameters", build.parameters},
+                        {"filter", filter_name(build.filter)},
+                        {"storage", format_name(build.storage)},
+                        {"filtering", filtering_name(build.filtering)},
+                        {"render", unnamed_render_json(render)},
+                        {"region", region},
+                        {"frames", render.frames},
+                        {"warm_up", render.warm_up},
+                        {"seed", experiment.seed},
+                        {"reference", reference},
+                        {"baseline", experiment.baseline},
+                        {"context", experiment.context},
+                        {"memory_limit", experiment.memory_limit ? Json(*experiment.memory_limit) : Json()},
+                        {"minimum_psnr_db", json_or_null(experiment.minimum_psnr_db)}};
+  if (experiment.explain_left_out) configuration["explain_left_out"] = true;
+  return configuration;
 }
 
 }  // namespace amrtex

@@ -69,6 +69,7 @@ struct Experiment {
   /// after every point, so that times are ratios inside one run.
   bool baseline = false;
   bool explain_error = false;     ///< records hold the error by cause, for several more pictures a point (bench/error_split.hpp)
+  bool explain_left_out = false;  ///< records hold what each part left out would have cost to build (bench/left_out_time.hpp)
   std::vector<std::string> axes;  ///< places in the file whose list has more than one value
 
   std::size_t points() const { return builds.size() * renders.size(); }

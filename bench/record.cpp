@@ -335,7 +335,11 @@ Json memory_json(const EncodedField& field, std::int64_t leaf_cells) {
 
 Json left_out_json(const EncodedField& field) {
   Json list = Json::array();
-  for (const LeftOut& item : field.left_out) list.push_back({{"what", item.what}, {"why", item.why}, {"bytes", item.bytes}});
+  for (const LeftOut& item : field.left_out)
+    list.push_back({{"what", item.what},
+                    {"why", item.why},
+                    {"bytes", item.bytes},
+                    {"seconds", item.seconds ? Json(*item.seconds) : Json()}});
   return list;
 }
 

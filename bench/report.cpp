@@ -127,6 +127,16 @@ Cell left_out_cell(const Json& record, const Group&) {
   return bytes / kMebibyte;
 }
 
+/// What building that would have taken, as far as it was measured.
+Cell left_out_seconds_cell(const Json& record, const Group&) {
+  const Json& list = at(record, "/left_out");
+  if (!list.is_array()) return std::monostate();
+  std::optional<double> seconds;
+  for (const Json& item : list)
+    if (const Json& own = at(item, "/seconds"); own.is_number()) seconds = seconds.value_or(0) + own.get<double>();
+  return seconds ? Cell(*seconds) : Cell(std::monostate());
+}
+
 bool is_linear(const Json& record) { return text_of(at(record, "/filter")) != "nearest"; }
 
 bool same(const Json& a, const Json& b, const char* pointer) { return at(a, pointer) == at(b, pointer); }
@@ -190,6 +200,7 @@ constexpr ColumnRule kColumns[] = {
     {"padding", "padding (MiB)", "", Role::measure, true, mebibytes<"/memory/by_role/padding">},
     {"texels_per_cell", "texels per cell", "", Role::measure, true, value<"/memory/texels_per_cell">},
     {"left_out", "left out (MiB)", "", Role::measure, true, left_out_cell},
+    {"left_out_seconds", "left out (s)", "", Role::measure, true, left_out_seconds_cell},
     {"build", "build (s)", "", Role::measure, true, value<"/build_seconds">},
     {"upload", "upload (s)", "", Role::measure, true, value<"/upload_seconds">},
     {"wall", "frame wall (ms)", "", Role::measure, true, timing<"/frame/wall_ms">},
@@ -232,8 +243,8 @@ bool is_split(const ColumnRule& rule) { return std::string_view(rule.key).starts
 bool is_default(const ColumnRule& rule) {
   if (is_split(rule)) return false;
   constexpr auto on_demand = std::to_array<std::string_view>(
-      {"left_out", "p95_error", "within_tolerance", "baseline", "upload", "rays", "regions_skipped", "max_error", "mrse",
-       "rmse_common", "pages", "border_overhead", "border_formula", "oversampling", "passes"});
+      {"left_out", "left_out_seconds", "p95_error", "within_tolerance", "baseline", "upload", "rays", "regions_skipped",
+       "max_error", "mrse", "rmse_common", "pages", "border_overhead", "border_formula", "oversampling", "passes"});
   return std::find(on_demand.begin(), on_demand.end(), rule.key) == on_demand.end();
 }
 

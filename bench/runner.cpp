@@ -10,6 +10,7 @@
 #include "bench/environment.hpp"
 #include "bench/error_split.hpp"
 #include "bench/image_error.hpp"
+#include "bench/left_out_time.hpp"
 #include "bench/record.hpp"
 #include "bench/statistics.hpp"
 #include "renderers/hierarchy_reference.hpp"
@@ -122,6 +123,7 @@ class Runner {
     std::unique_ptr<Built> built;
     try {
       built = make(build, scene_of(experiment_, *renders.front()));
+      if (experiment_.explain_left_out) time_left_out(find_encoding(build.encoding), *mesh_, built->request, built->field);
     } catch (const UsageError&) {
       throw;  // a bad parameter concerns the whole experiment
     } catch (const std::exception& error) {

@@ -132,7 +132,7 @@ void require_float_values(const Encoding& encoding, const AmrHierarchy& h, const
 }  // namespace
 
 bool any_missing(const AmrHierarchy& hierarchy, const BuildRequest& request) {
-  if (request.needs.everything) return true;
+  if (request.needs.keeps_validity()) return true;
   for (int i = 0; i < request.field_count(); ++i)
     if (hierarchy.has_missing(request.field_at(i))) return true;
   return false;

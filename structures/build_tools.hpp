@@ -54,7 +54,7 @@ bool power_of_two_ratios(const AmrHierarchy& hierarchy);
 bool hidden(const SceneNeeds& needs, ValueRange range, double origin, Storage storage, StorageScale scale);
 
 /// Must an encoding of the request's fields keep validity bits? One field with missing cells is enough, or a scene
-/// that asks for everything.
+/// that asks for them.
 bool any_missing(const AmrHierarchy& hierarchy, const BuildRequest& request);
 
 /// What the built field is filtered by: `nearest` and r64f know no hardware filter.

@@ -110,6 +110,29 @@ const Encoding& find_encoding(std::string_view name) {
                                join_names(all_encodings(), [](const Encoding* e) { return e->name(); })));
 }
 
+SceneNeeds with_part(SceneNeeds needs, Part part) {
+  switch (part) {
+    case Part::none:
+      break;
+    case Part::validity:
+      needs.validity = true;
+      break;
+    case Part::border:
+      needs.border = true;
+      break;
+    case Part::value_ranges:
+      needs.value_ranges = true;
+      break;
+    case Part::gradients:
+      needs.gradients = true;
+      break;
+    case Part::hidden:
+      needs.invisible.clear();
+      break;
+  }
+  return needs;
+}
+
 Json complete_parameters(const Encoding& encoding, const Json& given) {
   const std::vector<ParameterInfo> known = encoding.parameters();
   for (const auto& [key, value] : given.items())

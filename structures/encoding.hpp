@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -59,6 +60,16 @@ struct Support {
   std::string reason;  ///< why not
 };
 
+/// Parts of structures that come and go with a scene's needs.
+enum class Part {
+  none,          ///< no need of a scene brings it
+  validity,      ///< bits that tell cells without a value
+  border,        ///< cells around a brick or page
+  value_ranges,  ///< by which regions are skipped
+  gradients,
+  hidden  ///< what the transfer function makes invisible
+};
+
 /// The one switch for what builders and shaders leave out (computed from the scene).
 struct SceneNeeds {
   Filter filter = Filter::nearest;
@@ -67,16 +78,24 @@ struct SceneNeeds {
   bool gradients = false;        ///< surfaces are lit: stored gradients are of use where an encoding has room for them
   bool level_of_detail = false;  ///< refined cells may be drawn in place of what lies below them
   bool draw_boxes = false;       ///< the consumer draws box by box: EncodedField::draw_tree, where the encoding can give one
-  bool everything = false;   ///< nothing is left out for want of need: what leaving out saves is measured against this
+  bool everything = false;       ///< nothing is left out for want of need: what leaving out saves is measured against this
+  bool validity = false;         ///< bits are kept though every cell has a value
+  bool border = false;           ///< a border is kept though the filter reads none
   /// First and last value of intervals without extinction, ascending (renderers/scene_bindings.hpp): parts of the structure whose
   /// values lie in one of them are left out. Empty: all are kept.
   std::vector<std::array<double, 2>> invisible = {};
   bool operator==(const SceneNeeds&) const = default;
+  bool keeps_validity() const { return everything || validity; }
+  bool keeps_border() const { return everything || border; }
 };
+/// The same needs, and this part although nothing reads it. The needs themselves for Part::none.
+SceneNeeds with_part(SceneNeeds needs, Part part);
 
 struct LeftOut {
   std::string what, why;
   std::int64_t bytes = 0;
+  Part part = Part::none;              ///< what with_part() brings it back with
+  std::optional<double> seconds = {};  ///< of the build, where they were measured (bench/left_out_time.hpp)
 };
 
 /// A build parameter: what the command line and experiment files may say.

@@ -544,5 +544,17 @@ TEST(ExplainError, IsOffUnlessAskedForAndNamesTheRecordOnlyThen) {
   EXPECT_THAT(complaint(both.dump()), HasSubstr("no error to explain"));
 }
 
+TEST(ExplainLeftOut, IsOffUnlessAskedForAndNamesTheRecordOnlyThen) {
+  const Experiment explained = parsed(with("explain_left_out", "true"));
+  EXPECT_FALSE(parsed(kSmall).explain_left_out);
+  EXPECT_TRUE(explained.explain_left_out);
+  const auto hash = [](const Experiment& e) {
+    return configuration_hash(point_configuration(e, e.builds.front(), e.renders.front(), "mesh"));
+  };
+  EXPECT_EQ(hash(parsed(kSmall)), hash(parsed(with("explain_left_out", "false"))));
+  EXPECT_NE(hash(parsed(kSmall)), hash(explained));
+  EXPECT_THAT(complaint(with("explain_left_out", "1")), HasSubstr("explain_left_out"));
+}
+
 }  // namespace
 }  // namespace amrtex

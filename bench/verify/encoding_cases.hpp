@@ -37,6 +37,9 @@ struct BuildOptions {
   bool draw_boxes = false;
   bool level_of_detail = false;
   bool everything = false;
+  bool validity = false;
+  bool border = false;
+  bool gradients = false;
   std::vector<std::array<double, 2>> invisible = {};
 };
 
@@ -50,8 +53,7 @@ inline ContextInfo handle_limits(const ContextInfo& info) {
   return limits;
 }
 
-/// Throws UnsupportedError for a mesh or combination that the encoding refuses.
-inline EncodedField build(const AmrHierarchy& h, const EncodingCase& c, const BuildOptions& options = {}) {
+inline BuildRequest build_request(const EncodingCase& c, const BuildOptions& options) {
   BuildRequest request;
   request.field = options.field;
   request.more_fields = options.more_fields;
@@ -62,10 +64,18 @@ inline EncodedField build(const AmrHierarchy& h, const EncodingCase& c, const Bu
   request.needs.draw_boxes = options.draw_boxes;
   request.needs.level_of_detail = options.level_of_detail;
   request.needs.everything = options.everything;
+  request.needs.validity = options.validity;
+  request.needs.border = options.border;
+  request.needs.gradients = options.gradients;
   request.needs.invisible = options.invisible;
   request.parameters = c.parameters;
   request.context = options.limits.value_or(c.limits);
-  return c.encoding->build(h, request);
+  return request;
+}
+
+/// Throws UnsupportedError for a mesh or combination that the encoding refuses.
+inline EncodedField build(const AmrHierarchy& h, const EncodingCase& c, const BuildOptions& options = {}) {
+  return c.encoding->build(h, build_request(c, options));
 }
 
 /// Does the encoding take this mesh? What it refuses is a record `unsupported` and no failure.

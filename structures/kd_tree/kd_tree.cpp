@@ -297,7 +297,7 @@ Options KdTree::options(const Json& parameters, const SceneNeeds& needs) const {
   o.wrap = parameters.at("wrap").get<bool>();
   o.detail = needs.level_of_detail;
   o.vertices = needs.filter == Filter::linear_vertex;
-  o.border = needs.filter == Filter::linear_lod || (needs.everything && !o.vertices) ? 1 : 0;
+  o.border = needs.filter == Filter::linear_lod || (needs.keeps_border() && !o.vertices) ? 1 : 0;
   return o;
 }
 
@@ -556,19 +556,20 @@ std::vector<LeftOut> left_out(const AmrHierarchy& h, const BuildRequest& request
   const std::int64_t value_bytes = std::int64_t{request.field_count()} * texel_bytes(request.storage);
   if (p.pruned.leaves > 0)
     list.push_back({"leaves, and what they leave of bricks", "the transfer function hides all that is in them",
-                    p.pruned.brick_texels * value_bytes + 4 * p.data_words * p.pruned.leaves});
+                    p.pruned.brick_texels * value_bytes + 4 * p.data_words * p.pruned.leaves, Part::hidden});
   if (!any_missing(h, request)) {
     std::int64_t words = p.block_count();
     for (const Leaf& leaf : p.tree.leaves) words += request.field_count() * words_for_bits(leaf.cells.cells());
-    list.push_back({"validity bits", "every cell has a value", 4 * words});
+    list.push_back({"validity bits", "every cell has a value", 4 * words, Part::validity});
   }
-  if (!request.needs.value_ranges) list.push_back({"value ranges", "no region is skipped", 4 * p.block_count()});
+  if (!request.needs.value_ranges)
+    list.push_back({"value ranges", "no region is skipped", 4 * p.block_count(), Part::value_ranges});
   if (const std::int64_t cells = undrawn_cells(h, p); cells > 0)
     list.push_back({"refined parts of subgrids", "no level of detail is drawn", cells * value_bytes});
   if (!o.vertices && o.border == 0) {
     std::int64_t border = 0;
     for (const Brick& b : p.bricks) border += b.cells.grown(1).cells() - b.cells.cells();
-    list.push_back({"border layer", "the filter nearest reads one cell", border * value_bytes});
+    list.push_back({"border layer", "the filter nearest reads one cell", border * value_bytes, Part::border});
   }
   return list;
 }

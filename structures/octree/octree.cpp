@@ -862,16 +862,17 @@ std::vector<LeftOut> left_out(const BuildRequest& request, const Options& o, con
   std::vector<LeftOut> list;
   if (tree.pruned > 0)  // what is left then needs bits
     list.push_back({"nodes", "no filter reads them where something can be seen",
-                    tree.pruned * node_bytes(request, o, p) - (o.paper_layout ? 0 : tree.nodes)});
+                    tree.pruned * node_bytes(request, o, p) - (o.paper_layout ? 0 : tree.nodes), Part::hidden});
   if (o.paper_layout && !request.needs.gradients)
-    list.push_back({"gradients", "no surface is lit; their two channels stay empty", 0});
+    list.push_back(
+        {"gradients", "no surface is lit; their two channels stay empty", 0, o.store_gradients ? Part::gradients : Part::none});
   if (!p.lod_texture)
     list.push_back({"LOD texture",
                     p.averages_in_slots ? "the averages stand in the texels that inner children leave unused"
                                         : "the filter nearest reads no averages",
                     tree.nodes * texel_bytes(request.storage)});
-  if (!p.validity && !o.paper_layout) list.push_back({"validity bits", "every cell has a value", tree.nodes});
-  if (linear && !p.ranges) list.push_back({"value ranges", "no region is skipped", 4 * tree.nodes});
+  if (!p.validity && !o.paper_layout) list.push_back({"validity bits", "every cell has a value", tree.nodes, Part::validity});
+  if (linear && !p.ranges) list.push_back({"value ranges", "no region is skipped", 4 * tree.nodes, Part::value_ranges});
   return list;
 }
 

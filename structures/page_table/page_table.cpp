@@ -379,7 +379,7 @@ Options PageTable::options(const Json& parameters, const SceneNeeds& needs) cons
         fmt::format("encoding page_table: centring {} has no filter {}; centring cell has nearest, linear_page and centring node "
                     "has linear_vertex",
                     o.nodes ? "node" : "cell", filter_name(filter)));
-  o.border = filter == Filter::linear_page || (needs.everything && !o.nodes) ? 1 : 0;
+  o.border = filter == Filter::linear_page || (needs.keeps_border() && !o.nodes) ? 1 : 0;
   o.edge = o.nodes ? o.page_size + 1 : o.page_size + 2 * o.border;
   return o;
 }
@@ -629,17 +629,18 @@ std::vector<LeftOut> left_out(const Options& o, const TablePlan& table, std::int
   std::vector<LeftOut> list;
   if (pruned > 0) {
     const std::int64_t page_bytes = o.page_texels() * texel_bytes(field.storage) + (validity ? o.page_cells() / 8 : 0);
-    list.push_back({"pages", "the transfer function hides all that is in them", pruned * page_bytes * field.field_count});
+    list.push_back(
+        {"pages", "the transfer function hides all that is in them", pruned * page_bytes * field.field_count, Part::hidden});
   }
   const std::int64_t pages = stored * field.field_count;
-  if (!validity) list.push_back({"validity bits", "every cell has a value", pages * o.page_cells() / 8});
+  if (!validity) list.push_back({"validity bits", "every cell has a value", pages * o.page_cells() / 8, Part::validity});
   if (!table.green)
-    list.push_back(
-        {"second channel of the table", "no region is skipped and no page is constant", table.top_bytes() + table.sub_bytes()});
+    list.push_back({"second channel of the table", "no region is skipped and no page is constant",
+                    table.top_bytes() + table.sub_bytes(), Part::value_ranges});
   if (!o.nodes && o.border == 0) {
     const std::int64_t with_border = std::int64_t{o.page_size + 2} * (o.page_size + 2) * (o.page_size + 2);
     list.push_back({"border layer", "the filter nearest reads one cell",
-                    pages * (with_border - o.page_cells()) * texel_bytes(field.storage)});
+                    pages * (with_border - o.page_cells()) * texel_bytes(field.storage), Part::border});
   }
   return list;
 }

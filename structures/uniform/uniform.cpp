@@ -18,12 +18,19 @@ namespace {
 constexpr std::array<Filter, 3> kFilters{Filter::nearest, Filter::linear_page, Filter::linear_vertex};
 constexpr int kBlock = AMRTEX_DENSE_BLOCK;
 
+/// Are there cells without a value, whatever the scene asks for?
+bool cells_missing(const AmrHierarchy& h, BuildRequest request) {
+  request.needs = {};
+  return any_missing(h, request);
+}
+
 struct Plan {
   int level;
   Vec3i cells;
   Vec3i blocks;
   int fields;
   bool validity;
+  bool may_border;  ///< the filter reads one where cells are missing
   bool ranges;
   int border;     ///< texels round the domain: the fills of cells outside, which clamping gives only where no cell is missing
   bool vertices;  ///< texels are vertices, not cells
@@ -74,7 +81,8 @@ Plan Uniform::plan(const AmrHierarchy& h, const BuildRequest& request, const Jso
   p.validity = any_missing(h, request);
   p.ranges = request.needs.value_ranges;
   p.vertices = request.needs.filter == Filter::linear_vertex;
-  p.border = p.validity && request.needs.filter == Filter::linear_page ? 1 : 0;
+  p.may_border = request.needs.filter == Filter::linear_page;
+  p.border = p.may_border && (request.needs.keeps_border() || cells_missing(h, request)) ? 1 : 0;
   const std::int64_t bytes = p.bytes(request.storage);
   require_budget(*this, bytes, request);
   const int limit = request.context.max_3d_texture_size;
@@ -263,13 +271,17 @@ EncodedField Uniform::build_blocks(const AmrHierarchy& h, const BuildRequest& re
   if (p.validity)
     field.textures.push_back(std::move(out.validity));
   else
-    field.left_out.push_back({"validity bits", "every cell has a value", 4 * p.validity_words()});
+    field.left_out.push_back({"validity bits", "every cell has a value", 4 * p.validity_words(), Part::validity});
+  if (p.may_border && p.border == 0)
+    field.left_out.push_back({"border layer", "outside the domain lie the cells at its faces",
+                              p.fields * (p.texels().grown(1).cells() - p.texels().cells()) * texel_bytes(request.storage),
+                              Part::border});
   if (p.ranges)
     field.textures.push_back(std::move(out.ranges));
   else
     field.left_out.push_back({"value ranges",
                               request.needs.draw_boxes ? "the domain is drawn as one box" : "no region is skipped",
-                              4 * p.block_count()});
+                              4 * p.block_count(), request.needs.draw_boxes ? Part::none : Part::value_ranges});
   field.statistics = {{"blocks", p.block_count()}};
   return field;
 }

@@ -29,9 +29,11 @@ TEST(Uniform, HasOneTexelAFinestCellAndOneRangeABlock) {
   EXPECT_EQ(field.find("dense_validity"), nullptr);
   EXPECT_EQ(field.memory(), (MemoryByRole{80 * 8 * 8 * 4, 0, field.find("dense_ranges")->bytes(), 0}));
   EXPECT_EQ(field.build_parameters["level"], 1) << "null is the finest";
-  ASSERT_EQ(field.left_out.size(), 1u);
+  ASSERT_EQ(field.left_out.size(), 2u);
   EXPECT_EQ(field.left_out[0].what, "validity bits");
   EXPECT_EQ(field.left_out[0].bytes, 80 * 8 * 8 / 8);
+  EXPECT_EQ(field.left_out[1].what, "border layer");
+  EXPECT_EQ(field.left_out[1].bytes, (82 * 10 * 10 - 80 * 8 * 8) * 4);
   EXPECT_EQ(uniform_field(h, Filter::linear_page, {}, {.storage = Storage::r8}).find("tex_dense")->bytes(), 80 * 8 * 8);
 }
 
