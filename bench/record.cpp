@@ -309,6 +309,12 @@ Json blank_record(Status status, std::string_view reason) {
   return record;
 }
 
+const Json& value_at(const Json& json, const std::string& pointer) {
+  static const Json null;
+  const Json::json_pointer p(pointer);
+  return json.contains(p) ? json.at(p) : null;
+}
+
 Json timing_json(std::span<const double> samples_ms) {
   if (samples_ms.empty()) return nullptr;
   const Summary s = summarize(samples_ms);

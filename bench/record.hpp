@@ -20,6 +20,9 @@ std::string_view status_name(Status status);
 /// A record with every fixed key in its order, all null but schema and status.
 Json blank_record(Status status, std::string_view reason = "");
 
+/// The value at a JSON pointer such as /frame/wall_ms/median; null where it, or something above it, is not there.
+const Json& value_at(const Json& json, const std::string& pointer);
+
 /// Parts of records. Times in milliseconds.
 Json timing_json(std::span<const double> samples_ms);  ///< {"median", "mad", "ci95", "min", "n"}; null without samples
 Json memory_json(const EncodedField& field, std::int64_t leaf_cells);

@@ -220,6 +220,7 @@ class Runner {
       if (common.filter != Filter::linear_page) common.page_level = 0;
       const Picture shared = cached_reference(*mesh_, common, scene, reference.step, cache, hash);
       record["error_common"] = error_json(compare(picture, shared), hash);
+      record["error_common"]["p95"] = percentile(pixel_errors(picture, shared), 0.95);
       record["error_common"]["filter"] = filter_name(common.filter);
     }
     if (experiment_.minimum_psnr_db && !reaches_psnr(error, *experiment_.minimum_psnr_db)) {
