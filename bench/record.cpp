@@ -392,6 +392,14 @@ bool write_record(const std::filesystem::path& folder, std::string_view hash, co
   return true;
 }
 
+void write_atomically(const std::filesystem::path& target, std::string_view text) {
+  const std::filesystem::path folder = target.has_parent_path() ? target.parent_path() : std::filesystem::path(".");
+  TemporaryFile file(folder / fmt::format(".{}.{}.tmp", target.filename().string(), ::getpid()));
+  file.write(text);
+  file.publish(target, true);
+  sync_folder(folder);
+}
+
 Json read_record(const std::filesystem::path& path) {
   try {
     std::ifstream in(path, std::ios::binary);

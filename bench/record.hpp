@@ -43,6 +43,8 @@ bool has_record(const std::filesystem::path& folder, std::string_view hash);
 /// Validates, then writes atomically: temporary name, fsync, rename. A record that
 /// exists stays as it is unless `force`; returns whether this one was written.
 bool write_record(const std::filesystem::path& folder, std::string_view hash, const Json& record, bool force);
+/// Writes under a temporary name beside `target`, fsync, rename; what was there is replaced. Throws Error naming the file.
+void write_atomically(const std::filesystem::path& target, std::string_view text);
 /// Throws Error naming the file when it is no valid record.
 Json read_record(const std::filesystem::path& path);
 /// All records of `folder`, by file name. Throws Error naming the broken file.
