@@ -174,11 +174,12 @@ class Search {
   std::vector<BuildPoint> best_builds(std::vector<MeasuredCandidate> all) {
     std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.frame_ms < b.frame_ms; });
     std::set<std::pair<std::string, Filter>> seen;
-    std::stable_partition(all.begin(), all.end(), [&](const MeasuredCandidate& m) {
-      return seen.insert({m.candidate.build.encoding, m.candidate.build.filter}).second;
-    });
+    std::vector<MeasuredCandidate> order, others;
+    for (const MeasuredCandidate& m : all)
+      (seen.insert({m.candidate.build.encoding, m.candidate.build.filter}).second ? order : others).push_back(m);
+    order.insert(order.end(), others.begin(), others.end());
     std::vector<BuildPoint> best;
-    for (const MeasuredCandidate& m : all) {
+    for (const MeasuredCandidate& m : order) {
       if (best.size() < kCoarseBuilds)
         best.push_back(m.candidate.build);
       else
@@ -350,7 +351,8 @@ Advice advise(const AdviceRequest& request, const Effort& full, const Measure& m
 }
 
 Measure measure_by_running(const Experiment& scene, const AdviceRequest& request, const RunOptions& options) {
-  return [scene, request, options](std::span<const Candidate> candidates, const Effort& effort) {
+  const std::string mesh = load_dataset(scene, scene.datasets.front()).content_hash(0);  // part of the records' names
+  return [scene, request, options, mesh](std::span<const Candidate> candidates, const Effort& effort) {
     Experiment experiment = scene;
     experiment.reference = ReferenceSettings{effort.reference_step, request.reference, !request.reference};
     if (options.context) experiment.context = context_kind_name(*options.context);
@@ -376,8 +378,6 @@ Measure measure_by_running(const Experiment& scene, const AdviceRequest& request
     RunOptions run = options;
     run.wanted = [&](const BuildPoint& b, const RenderPoint& r) { return wanted.contains(key_of({b, r.settings})); };
     run_experiment(experiment, run);
-    // the mesh's hash stands in every record
-    const std::string mesh = load_records(options.folder).front().at("dataset").at("hash");
     std::vector<Json> records;
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       const Json configuration = point_configuration(experiment, candidates[i].build, drawn[i], mesh);

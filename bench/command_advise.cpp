@@ -233,8 +233,9 @@ int run(const Arguments& a) {
   if (!a.scene.empty()) write_atomically(a.scene, text);
   if (a.json) return 0;
   print_measured("Take", best);
-  fmt::print("\nThe fastest within the error {:g} (against {}{}), of {} pictures.\n", request.tolerance, a.reference,
-             a.memory_limit.empty() ? "" : fmt::format(") and {:.2f} MiB (", mebibytes(request.memory_limit)), advice.pictures);
+  const std::string limit = a.memory_limit.empty() ? "" : fmt::format(" and {:.2f} MiB", mebibytes(request.memory_limit));
+  fmt::print("\nThe fastest within the error {:g}{}, of {} pictures. Errors are against the reference of {}.\n",
+             request.tolerance, limit, advice.pictures, a.reference == "own" ? "the own filter" : a.reference);
   print_others(advice);
   if (a.scene.empty())
     fmt::print("\nScene, for `amrtex render` (--scene FILE writes it):\n{}", text);

@@ -119,15 +119,16 @@ std::string scene_name(const Json& record) {
 
 std::string renderer_of(const Scene& scene) { return text_at(*scene.records.front(), "/context/renderer"); }
 
-/// In the order of their first records.
-std::vector<Scene> scenes_of(std::span<const Json> records) {
+/// By name. Where errors are those of the own filter, a scene is that of one filter.
+std::vector<Scene> scenes_of(std::span<const Json> records, const Question& question) {
   std::map<std::string, std::size_t> places;
   std::vector<Scene> scenes;
   for (const Json& record : records) {
-    const Json key = Json::array({value_at(record, "/context/renderer"), value_at(record, "/dataset/hash"),
-                                  value_at(record, "/dataset/field"), scene_part(value_at(record, "/render"))});
+    const Json key =
+        Json::array({value_at(record, "/context/renderer"), value_at(record, "/dataset/hash"), value_at(record, "/dataset/field"),
+                     scene_part(value_at(record, "/render")), question.common ? Json() : value_at(record, "/filter")});
     const auto [place, added] = places.try_emplace(key.dump(), scenes.size());
-    if (added) scenes.push_back({scene_name(record), {}});
+    if (added) scenes.push_back({scene_name(record) + (question.common ? "" : ", " + text_at(record, "/filter")), {}});
     scenes[place->second].records.push_back(&record);
   }
   std::stable_sort(scenes.begin(), scenes.end(), [](const Scene& a, const Scene& b) { return a.name < b.name; });
@@ -135,7 +136,7 @@ std::vector<Scene> scenes_of(std::span<const Json> records) {
 }
 
 std::string what_error(const Question& question, const Records& records) {
-  if (!question.common) return "error: against the reference of each row's own filter; comparable inside a filter only";
+  if (!question.common) return "error: against the reference of the row's own filter; page sizes define different fields";
   std::set<std::string> filters;
   for (const Json* record : records)
     if (const std::string filter = text_at(*record, "/error_common/filter"); !filter.empty()) filters.insert(filter);
@@ -281,7 +282,10 @@ Json diagram_points(const Scene& scene, const Question& question) {
 }
 
 Json axis(const char* field, const char* title) {
-  return {{"field", field}, {"type", "quantitative"}, {"title", title}, {"scale", {{"type", "log"}}}};
+  return {{"field", field},
+          {"type", "quantitative"},
+          {"title", title},
+          {"scale", {{"type", "log"}, {"nice", false}, {"padding", 12}}}};
 }
 
 Json tooltip(const Scene& scene, const Question& question) {
@@ -325,7 +329,7 @@ Json diagram(const Scene& scene, const Question& question) {
                      {"height", 14 * lines.size()},
                      {"view", {{"stroke", nullptr}}},
                      {"data", {{"values", lines}}},
-                     {"mark", {{"type", "text"}, {"align", "left"}, {"limit", 560}, {"fontSize", 10}}},
+                     {"mark", {{"type", "text"}, {"align", "left"}, {"limit", 2000}, {"fontSize", 10}}},
                      {"encoding",
                       {{"x", {{"value", 0}}},
                        {"y", {{"field", "line"}, {"type", "ordinal"}, {"axis", nullptr}}},
@@ -366,7 +370,7 @@ WorkPrecision make_work_precision(const std::filesystem::path& path, std::span<c
   for (const JsonNode& entry : file.root().items()) {
     if (!entry.find("work_precision")) continue;
     const Question question = read_question(entry);
-    for (const Scene& scene : scenes_of(records)) {
+    for (const Scene& scene : scenes_of(records, question)) {
       result.tables.push_back(fastest_table(scene, question));
       result.tables.push_back(front_table(scene, question));
       if (auto table = unmeasured_table(scene, question)) result.tables.push_back(std::move(*table));

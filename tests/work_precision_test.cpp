@@ -168,6 +168,18 @@ TEST_F(WorkPrecisionTest, KeepsScenesApart) {
   EXPECT_THAT(cells(result.tables[0], "wall"), Contains("8 ± 0"));
 }
 
+TEST_F(WorkPrecisionTest, KeepsFiltersApartWhereErrorsAreTheirOwn) {
+  std::vector<Json> records = {record({"uniform", "r32f", 1, 8, 45}), record({"uniform", "r32f", 1, 4, 45})};
+  records[1]["filter"] = "linear_page";
+  EXPECT_THAT(made(records).diagrams, SizeIs(1)) << "against one reference they compete";
+  for (Json& r : records) std::swap(r["error"], r["error_common"]);
+  for (Json& r : records) r["error"]["split"] = nullptr;
+  const WorkPrecision own = made(records, R"([{"work_precision": {"error": "own"}}])");
+  ASSERT_THAT(own.diagrams, SizeIs(2));
+  EXPECT_EQ(own.diagrams[0].name, "work_precision_shell_front_ramp_dvr_linear_page");
+  EXPECT_THAT(cells(own.tables[0], "wall"), Contains("4 ± 0"));
+}
+
 TEST_F(WorkPrecisionTest, KeepsWhatWasNotMeasuredInSight) {
   std::vector<Json> records = four_settings();
   for (const double step : {1.0, 0.5})
