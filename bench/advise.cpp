@@ -20,7 +20,7 @@ constexpr int kCoarseShare = 4;       ///< of the full picture's width and heigh
 constexpr int kLeastCoarseEdge = 64;  ///< pixels
 constexpr int kCoarseFrames = 3;
 constexpr double kCoarseSlack = 1.3;         ///< a structure is dropped where its small picture misses the tolerance by more
-constexpr std::size_t kCoarseBuilds = 12;    ///< structures drawn with all steps
+constexpr std::size_t kCoarseBuilds = 8;     ///< structures drawn with all steps
 constexpr std::size_t kCarefulSettings = 8;  ///< settings measured at full size, at a time
 constexpr int kCarefulRounds = 3;
 constexpr double kAlike = 1.1;  ///< ratios of times and bytes below it are not told
@@ -76,7 +76,7 @@ struct Reading {
 std::optional<Reading> reading_of(const Json& record, const AdviceRequest& request) {
   const std::string error = request.reference ? "/error_common" : "/error";
   const Json& bytes = value_at(record, "/memory/total_bytes");
-  const Reading r{number_at(record, "/frame/wall_ms/median"), number_at(record, error + "/p95"),
+  const Reading r{number_at(record, "/frame/wall_ms/median"), number_at(record, error + "/p95_seen"),
                   number_at(record, error + "/max"), bytes.is_number_integer() ? bytes.get<std::int64_t>() : 0};
   if (!std::isfinite(r.frame_ms) || !std::isfinite(r.error) || r.bytes > request.memory_limit) return std::nullopt;
   return r;

@@ -18,7 +18,7 @@ namespace amrtex {
 
 /// What is asked for, and among what.
 struct AdviceRequest {
-  double tolerance = 1e-2;  ///< error that 95 % of the pixels may not exceed, in (0, 1]
+  double tolerance = 1e-2;  ///< error that 95 % of the pixels that see something may not exceed, in (0, 1]
   std::int64_t memory_limit = std::numeric_limits<std::int64_t>::max();  ///< bytes of all textures and buffers of a structure
   std::vector<Filter> filters = {Filter::linear_lod, Filter::linear_page, Filter::linear_vertex, Filter::basis};
   std::vector<Storage> storages = {Storage::r32f, Storage::r16, Storage::r8};
@@ -48,7 +48,7 @@ using Measure = std::function<std::vector<Json>(std::span<const Candidate>, cons
 struct MeasuredCandidate {
   Candidate candidate;
   double frame_ms = 0;   ///< median wall time
-  double error = 0;      ///< that 95 % of the pixels do not exceed
+  double error = 0;      ///< that 95 % of the pixels do not exceed that are not empty
   double max_error = 0;  ///< of any pixel
   std::int64_t bytes = 0;
 };

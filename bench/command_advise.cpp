@@ -67,7 +67,7 @@ Json default_view(const AmrHierarchy& mesh) {
   const Vec3d at = (mesh.domain_lower() + mesh.domain_upper()) * 0.5;
   const double radius = glm::length(mesh.domain_upper() - mesh.domain_lower()) / 2;
   const double fov_y = 35;
-  const double distance = radius / std::sin(fov_y / 2 * 3.14159265358979323846 / 180);
+  const double distance = radius / std::sin(fov_y / 2 * 3.14159265358979323846 / 180) * 0.8;  // a box does not fill its sphere
   const Vec3d eye = at + glm::normalize(Vec3d(0.75, 0.55, 0.4)) * distance;
   return {{"eye", {eye.x, eye.y, eye.z}}, {"at", {at.x, at.y, at.z}}, {"fov_y", fov_y}};
 }
@@ -168,7 +168,8 @@ Json advice_json(const Arguments& a, const AdviceRequest& request, const Advice&
 void print_measured(const char* title, const MeasuredCandidate& m) {
   fmt::print("{}\n  structure  {}\n  steps      {}\n  memory     {:.2f} MiB\n  frame      {:.1f} ms\n", title,
              build_text(m.candidate.build), settings_text(m.candidate.settings), mebibytes(m.bytes), m.frame_ms);
-  fmt::print("  error      {:.2g} is not exceeded by 95 % of the pixels, {:.2g} by none\n", m.error, m.max_error);
+  fmt::print("  error      {:.2g} is not exceeded by 95 % of the pixels that see something, {:.2g} by none\n", m.error,
+             m.max_error);
 }
 
 /// The best of each encoding and filter that lost.
@@ -193,8 +194,8 @@ void print_others(const Advice& advice) {
 std::string why_none(const AdviceRequest& request, const Advice& advice) {
   if (advice.nearest) {
     const MeasuredCandidate& m = advice.measured[*advice.nearest];
-    return fmt::format("nothing reaches the error {:g} for 95 % of the pixels; the nearest has {:.2g}: {}, {}", request.tolerance,
-                       m.error, build_text(m.candidate.build), settings_text(m.candidate.settings));
+    return fmt::format("nothing reaches the error {:g} for 95 % of the pixels that see something; the nearest has {:.2g}: {}, {}",
+                       request.tolerance, m.error, build_text(m.candidate.build), settings_text(m.candidate.settings));
   }
   if (advice.smallest_bytes > request.memory_limit)
     return fmt::format("nothing fits into {} bytes; the smallest structure needs {} ({:.2f} MiB)", request.memory_limit,
@@ -252,7 +253,7 @@ void add_advise_command(CLI::App& app, Command& chosen) {
   c->add_option("data", a->data, "data set")->required();
   c->add_option("--field", a->field, "field to draw; the first otherwise");
   c->add_option("--tolerance", a->tolerance,
-                "error of a channel that 95 % of the pixels may not exceed, in (0, 1]; 0.01 otherwise");
+                "error of a channel that 95 % of the pixels that see something may not exceed, in (0, 1]; 0.01 otherwise");
   c->add_option("--memory-limit", a->memory_limit, "for the structure, as 512MiB");
   c->add_option("--filter", a->filters, "filters to try; the linear ones otherwise")->delimiter(',');
   c->add_option("--storage", a->storages, "storages to try; r32f, r16, r8 otherwise")->delimiter(',');

@@ -57,6 +57,25 @@ Failure failure_of(const std::exception& error) {
   return {Status::failed, error.what()};
 }
 
+/// Largest difference of the channels of each pixel that is not empty in both pictures, ascending: where the field is small on
+/// the picture, most pixels are empty and exact. One 0 where all are.
+std::vector<double> seen_errors(const Picture& picture, const Picture& reference) {
+  std::vector<double> errors;
+  const auto channels = static_cast<std::size_t>(picture.channels);
+  for (std::size_t pixel = 0; pixel < picture.values.size(); pixel += channels) {
+    double error = 0;
+    bool empty = true;
+    for (std::size_t i = pixel; i < pixel + channels; ++i) {
+      error = std::max(error, std::abs(picture.values[i] - reference.values[i]));
+      empty = empty && picture.values[i] == 0 && reference.values[i] == 0;
+    }
+    if (!empty) errors.push_back(error);
+  }
+  if (errors.empty()) errors.push_back(0);
+  std::sort(errors.begin(), errors.end());
+  return errors;
+}
+
 class Runner {
  public:
   Runner(const Experiment& experiment, const RunOptions& options)
@@ -214,6 +233,7 @@ class Runner {
       const Picture shared = cached_reference(*mesh_, common, scene, reference.step, cache, hash);
       record["error_common"] = error_json(compare(picture, shared), hash);
       record["error_common"]["p95"] = percentile(pixel_errors(picture, shared), 0.95);
+      record["error_common"]["p95_seen"] = percentile(seen_errors(picture, shared), 0.95);
       record["error_common"]["filter"] = filter_name(common.filter);
     }
     if (!reference.own) return true;
@@ -225,6 +245,7 @@ class Runner {
       record["error"]["split"]["level_of_detail"] = pruning_error(built, scene, picture);
     const std::vector<double> pixels = pixel_errors(picture, own);
     record["error"]["p95"] = percentile(pixels, 0.95);
+    record["error"]["p95_seen"] = percentile(seen_errors(picture, own), 0.95);
     if (scene.settings.integrator == Integrator::tolerance)
       record["error"]["within_tolerance"] = share_within(pixels, scene.settings.tolerance);
     if (experiment_.minimum_psnr_db && !reaches_psnr(error, *experiment_.minimum_psnr_db)) {

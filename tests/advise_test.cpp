@@ -48,7 +48,7 @@ Json record_of(const Cost& cost, std::int64_t limit) {
   }
   r["memory"] = {{"total_bytes", cost.bytes}};
   r["frame"] = {{"wall_ms", {{"median", cost.ms}}}};
-  r["error_common"] = {{"p95", cost.error}, {"max", 3 * cost.error}};
+  r["error_common"] = {{"p95_seen", cost.error}, {"max", 3 * cost.error}};
   return r;
 }
 

@@ -612,8 +612,9 @@ TEST_F(CommandLine, ABaselineThatCannotBeDrawnIsSaidOnce) {
 
 /// Few candidates and small pictures.
 std::vector<std::string> advise_arguments(const std::vector<std::string>& more) {
-  std::vector<std::string> arguments = {"advise", kData,     "--filter", "linear_vertex", "--storage", "r32f",     "--filtering",
-                                        "manual", "--width", "64",       "--height",      "64",        "--frames", "1"};
+  std::vector<std::string> arguments = {"advise",    kData,  "--filter",    "linear_lod", "--reference", "linear_lod",
+                                        "--storage", "r32f", "--filtering", "manual",     "--width",     "64",
+                                        "--height",  "64",   "--frames",    "1"};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return arguments;
 }
@@ -626,13 +627,14 @@ TEST_F(CommandLine, AdviseNamesASettingThatReachesTheErrorAndCanBeDrawn) {
   const Json json = Json::parse(r.out);
   const Json& advice = json.at("advice");
   EXPECT_LE(advice.at("p95").get<double>(), 0.02);
+  EXPECT_GT(advice.at("max").get<double>(), 0);
   EXPECT_LE(advice.at("bytes").get<std::int64_t>(), 1 << 20);
-  EXPECT_EQ(advice.at("filter"), "linear_vertex");
+  EXPECT_EQ(advice.at("filter"), "linear_lod");
   EXPECT_FALSE(json.at("lost").empty());
   EXPECT_EQ(json.at("scene"), Json::parse(read_text(at("s.json"))));
   const Result drawn = amrtex({"render", at("s.json").string(), "-o", at("s.npy").string()});
   EXPECT_EQ(drawn.exit_code, 0) << drawn.err;
-  EXPECT_EQ(read_npy(at("s.npy")).width(), 64);
+  EXPECT_EQ(read_npy(at("s.npy")).width, 64);
 }
 
 TEST_F(CommandLine, AdviseToReadSaysWhatWhyAndWhatElse) {
@@ -661,7 +663,7 @@ TEST_F(CommandLine, AdviseRefusesBadUsageBeforeAnyWork) {
                                                    {{"--memory-limit", "much"}, "much", "512MiB"},
                                                    {{"--memory-limit", "0"}, "--memory-limit 0", "one byte"},
                                                    {{"--field", "rho"}, "rho", "phi"},
-                                                   {{"--reference", "cubic"}, "cubic", "linear_vertex"},
+                                                   {{"--storage", "r64"}, "r64", "r32f"},
                                                    {{"--context", "vulkan"}, "vulkan", "osmesa"},
                                                    {{"--view", "{\"eye\": 3}"}, "eye", "at"},
                                                    {{"--transfer-function", "none.json"}, "none.json", "accepted"},
