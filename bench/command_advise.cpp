@@ -255,9 +255,9 @@ void add_advise_command(CLI::App& app, Command& chosen) {
   c->add_option("--tolerance", a->tolerance,
                 "error of a channel that 95 % of the pixels that see something may not exceed, in (0, 1]; 0.01 otherwise");
   c->add_option("--memory-limit", a->memory_limit, "for the structure, as 512MiB");
-  c->add_option("--filter", a->filters, "filters to try; the linear ones otherwise")->delimiter(',');
-  c->add_option("--storage", a->storages, "storages to try; r32f, r16, r8 otherwise")->delimiter(',');
-  c->add_option("--filtering", a->filterings, "hardware, manual; both otherwise")->delimiter(',');
+  c->add_option("--filter", a->filters, "filters to try; the linear ones otherwise")->allow_extra_args(false)->delimiter(',');
+  c->add_option("--storage", a->storages, "storages to try; r32f, r16, r8 otherwise")->allow_extra_args(false)->delimiter(',');
+  c->add_option("--filtering", a->filterings, "hardware, manual; both otherwise")->allow_extra_args(false)->delimiter(',');
   c->add_option("--reference", a->reference, "filter that pictures are held against; linear_vertex otherwise. own: each its own");
   c->add_option("--transfer-function", a->transfer_function,
                 "JSON file or the JSON itself (docs/experiments.md); a ramp over the field's range otherwise");
