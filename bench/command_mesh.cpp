@@ -69,15 +69,14 @@ void print_info(const AmrHierarchy& mesh) {
     }
 }
 
-/// A file with a specification, or the specification itself.
-Json read_specification(const std::string& text) {
-  if (!text.empty() && text.front() == '{') return JsonFile(text, "specification").root().json();
+}  // namespace
+
+Json read_json_argument(const std::string& text, const char* what) {
+  if (!text.empty() && text.front() == '{') return JsonFile(text, what).root().json();
   if (!fs::is_regular_file(text))
     throw UsageError(fmt::format("{}: no such file; accepted: a JSON file, or the JSON itself in quotes", text));
   return JsonFile::read(text).root().json();
 }
-
-}  // namespace
 
 void add_mesh_commands(CLI::App& app, Command& chosen) {
   struct Arguments {
@@ -108,7 +107,7 @@ void add_mesh_commands(CLI::App& app, Command& chosen) {
   generate->footer("Example: amrtex generate '{\"field\": \"shell\", \"levels\": 3}' -o out/shell");
   generate->callback([a, &chosen] {
     chosen = [a] {
-      write_amrex_plotfile(AmrHierarchy(generate_mesh(read_specification(a->input))), a->output);
+      write_amrex_plotfile(AmrHierarchy(generate_mesh(read_json_argument(a->input, "specification"))), a->output);
       return 0;
     };
   });

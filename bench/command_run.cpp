@@ -8,6 +8,7 @@
 #include "bench/record.hpp"
 #include "bench/report.hpp"
 #include "bench/runner.hpp"
+#include "bench/work_precision.hpp"
 
 namespace amrtex {
 namespace {
@@ -56,7 +57,12 @@ std::vector<Table> write_report(const fs::path& folder, const std::string& colum
   write_tables(folder, tables);
   const fs::path file = folder / "tables.json";
   if (!fs::exists(file)) return tables;
-  for (Table& table : make_paper_tables(file, load_records(folder))) tables.push_back(std::move(table));
+  const std::vector<Json> records = load_records(folder);
+  for (Table& table : make_paper_tables(file, records)) tables.push_back(std::move(table));
+  const WorkPrecision work_precision = make_work_precision(file, records);
+  tables.insert(tables.end(), work_precision.tables.begin(), work_precision.tables.end());
+  for (const Diagram& diagram : work_precision.diagrams)
+    write_text(folder / (diagram.name + ".vl.json"), diagram.specification.dump(1) + "\n");
   write_tables(folder, tables);
   return tables;
 }
@@ -72,7 +78,10 @@ void copy_beside(const Experiment& experiment, const fs::path& folder, const cha
 int run(const Arguments& a) {
   const Experiment experiment = read_experiment(a.input);
   const fs::path paper_tables = experiment.file.parent_path() / "tables.json";
-  if (fs::exists(paper_tables)) make_paper_tables(paper_tables, {});  // an error ends here, before any work
+  if (fs::exists(paper_tables)) {  // an error ends here, before any work
+    make_paper_tables(paper_tables, {});
+    make_work_precision(paper_tables, {});
+  }
   RunOptions options;
   options.folder = a.output;
   options.force = a.force;

@@ -20,9 +20,12 @@ void add_sample_command(CLI::App& app, Command& chosen);
 void add_render_command(CLI::App& app, Command& chosen);
 void add_run_commands(CLI::App& app, Command& chosen);  // run, report
 void add_verify_command(CLI::App& app, Command& chosen);
+void add_advise_command(CLI::App& app, Command& chosen);
 
 /// "512MiB", "2GiB", "1000000". Throws UsageError.
 std::int64_t parse_bytes(const std::string& text);
+/// A JSON file, or the JSON itself. Throws UsageError naming the file, or `what` for JSON without one, and the line.
+Json read_json_argument(const std::string& text, const char* what);
 /// Throws UnsupportedError with the encoding's reason where this context cannot hold it.
 void require_support(const Encoding& encoding, const ContextInfo& context);
 

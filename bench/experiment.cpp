@@ -559,9 +559,14 @@ class Parser {
       experiment_.reference.reset();
       return;
     }
-    node->accept_keys(Names{"step", "filter"});
+    node->accept_keys(Names{"step", "filter", "own"});
     if (const auto step = node->find("step")) experiment_.reference->step = step->positive_number();
     if (const auto filter = node->find("filter")) experiment_.reference->common_filter = parse_common_filter(*filter);
+    if (const auto own = node->find("own")) {
+      experiment_.reference->own = own->boolean();
+      if (!experiment_.reference->own && !experiment_.reference->common_filter)
+        own->fail("without the own reference and with 'filter' own there is no reference; accepted: true, or another 'filter'");
+    }
   }
 
   static std::optional<Filter> parse_common_filter(const JsonNode& node) {
@@ -580,12 +585,16 @@ class Parser {
     if (const auto check = root_.find("check"); check && !check->json().is_null()) {
       check->accept_keys(Names{"psnr_db"});
       experiment_.minimum_psnr_db = check->require("psnr_db").number(0, 1000);
+      if (experiment_.reference && !experiment_.reference->own)
+        check->fail("pictures are checked against their own reference; accepted: null where 'reference' has 'own' false");
     }
     if (const auto baseline = root_.find("baseline")) experiment_.baseline = baseline->boolean();
     if (const auto explain = root_.find("explain_error")) {
       experiment_.explain_error = explain->boolean();
       if (experiment_.explain_error && !experiment_.reference)
         explain->fail("a picture without a reference has no error to explain");
+      if (experiment_.explain_error && !experiment_.reference->own)
+        explain->fail("what is explained is the error against the own reference; accepted: false where 'reference' has 'own' false");
     }
     if (const auto explain = root_.find("explain_left_out")) experiment_.explain_left_out = explain->boolean();
     if (const auto region = root_.find("region")) parse_region(*region);
@@ -713,6 +722,7 @@ Json point_configuration(const Experiment& experiment, const BuildPoint& build, 
     const auto& common = experiment.reference->common_filter;
     reference = {{"step", experiment.reference->step}, {"filter", common ? filter_name(*common) : "own"}};
     if (experiment.explain_error) reference["explain"] = true;  // absent elsewhere: older records keep their names
+    if (!experiment.reference->own) reference["own"] = false;   // likewise
   }
   Json configuration = {{"experiment", experiment.name},
                         {"dataset", dataset_hash},

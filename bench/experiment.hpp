@@ -51,6 +51,7 @@ struct ReferenceSettings {
   /// Filter of `error_common`; absent ("own" in the file) leaves that out. `linear_page`
   /// stands for one page of the finest level, the dense field.
   std::optional<Filter> common_filter = Filter::linear_vertex;
+  bool own = true;  ///< false: no `error`, which takes a reference of its own for each filter and page size
 };
 
 struct Experiment {

@@ -17,7 +17,6 @@
 namespace amrtex {
 namespace {
 
-using Pointer = Json::json_pointer;
 using Records = std::vector<const Json*>;
 /// JSON pointer -> the value that a record has there, or a list of such values. Not ordered_json, which tells
 /// objects apart by the order of their keys.
@@ -139,11 +138,7 @@ Entry read_entry(const JsonNode& node) {
 
 // --- what the records say ---
 
-/// Null where it, or something above it, is not there.
-Json at(const Json& json, const std::string& pointer) {
-  const Pointer p(pointer);
-  return json.contains(p) ? json.at(p) : Json();
-}
+Json at(const Json& json, const std::string& pointer) { return value_at(json, pointer); }
 
 bool accepts(const nlohmann::json& accepted, const nlohmann::json& value) {
   return accepted == value || (accepted.is_array() && std::find(accepted.begin(), accepted.end(), value) != accepted.end());
@@ -284,8 +279,9 @@ Table make_table(const Entry& entry, const std::string& renderer, const Records&
 std::vector<Table> make_paper_tables(const std::filesystem::path& path, std::span<const Json> records) {
   const JsonFile file = JsonFile::read(path);
   std::vector<Entry> entries;
-  for (const JsonNode& node : file.root().items()) entries.push_back(read_entry(node));
-  std::map<std::string, Records> by_renderer;  // their times do not belong side by side
+  for (const JsonNode& node : file.root().items())
+    if (!node.find("work_precision")) entries.push_back(read_entry(node));  // those are of bench/work_precision.cpp
+  std::map<std::string, Records> by_renderer;                               // their times do not belong side by side
   for (const Json& record : records) {
     const Json renderer = at(record, "/context/renderer");
     by_renderer[renderer.is_null() ? "none" : renderer.get<std::string>()].push_back(&record);

@@ -309,6 +309,12 @@ Json blank_record(Status status, std::string_view reason) {
   return record;
 }
 
+const Json& value_at(const Json& json, const std::string& pointer) {
+  static const Json null;
+  const Json::json_pointer p(pointer);
+  return json.contains(p) ? json.at(p) : null;
+}
+
 Json timing_json(std::span<const double> samples_ms) {
   if (samples_ms.empty()) return nullptr;
   const Summary s = summarize(samples_ms);
@@ -388,6 +394,14 @@ bool write_record(const std::filesystem::path& folder, std::string_view hash, co
   if (!file.publish(target, force)) return false;
   sync_folder(target.parent_path());
   return true;
+}
+
+void write_atomically(const std::filesystem::path& target, std::string_view text) {
+  const std::filesystem::path folder = target.has_parent_path() ? target.parent_path() : std::filesystem::path(".");
+  TemporaryFile file(folder / fmt::format(".{}.{}.tmp", target.filename().string(), ::getpid()));
+  file.write(text);
+  file.publish(target, true);
+  sync_folder(folder);
 }
 
 Json read_record(const std::filesystem::path& path) {

@@ -20,6 +20,9 @@ std::string_view status_name(Status status);
 /// A record with every fixed key in its order, all null but schema and status.
 Json blank_record(Status status, std::string_view reason = "");
 
+/// The value at a JSON pointer such as /frame/wall_ms/median; null where it, or something above it, is not there.
+const Json& value_at(const Json& json, const std::string& pointer);
+
 /// Parts of records. Times in milliseconds.
 Json timing_json(std::span<const double> samples_ms);  ///< {"median", "mad", "ci95", "min", "n"}; null without samples
 Json memory_json(const EncodedField& field, std::int64_t leaf_cells);
@@ -40,6 +43,8 @@ bool has_record(const std::filesystem::path& folder, std::string_view hash);
 /// Validates, then writes atomically: temporary name, fsync, rename. A record that
 /// exists stays as it is unless `force`; returns whether this one was written.
 bool write_record(const std::filesystem::path& folder, std::string_view hash, const Json& record, bool force);
+/// Writes under a temporary name beside `target`, fsync, rename; what was there is replaced. Throws Error naming the file.
+void write_atomically(const std::filesystem::path& target, std::string_view text);
 /// Throws Error naming the file when it is no valid record.
 Json read_record(const std::filesystem::path& path);
 /// All records of `folder`, by file name. Throws Error naming the broken file.

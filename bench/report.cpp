@@ -17,15 +17,9 @@ namespace {
 
 constexpr double kMebibyte = 1048576.0;
 
-using Pointer = Json::json_pointer;
 using Records = std::vector<const Json*>;
 
-/// The value at a JSON pointer; null where it, or something above it, is not there.
-const Json& at(const Json& json, const char* pointer) {
-  static const Json null;
-  const Pointer p(pointer);
-  return json.contains(p) ? json.at(p) : null;
-}
+const Json& at(const Json& json, const char* pointer) { return value_at(json, pointer); }
 
 std::string text_of(const Json& json) {
   if (json.is_null()) return "";
@@ -224,6 +218,7 @@ constexpr ColumnRule kColumns[] = {
     {"psnr", "PSNR (dB)", "", Role::measure, true, value<"/error/psnr_db">},
     {"psnr_common", "PSNR, common (dB)", "", Role::measure, true, value<"/error_common/psnr_db">},
     {"rmse_common", "RMSE, common", "", Role::measure, true, value<"/error_common/rmse">},
+    {"p95_common", "95th percentile, common", "", Role::measure, true, value<"/error_common/p95">},
     {"split_step", "step", "", Role::measure, true, value<"/error/split/step/rmse">},
     {"split_encoding", "encoding", "", Role::measure, true, value<"/error/split/encoding/rmse">},
     {"split_storage", "storage", "", Role::measure, true, value<"/error/split/storage/rmse">},
@@ -244,7 +239,7 @@ bool is_default(const ColumnRule& rule) {
   if (is_split(rule)) return false;
   constexpr auto on_demand = std::to_array<std::string_view>(
       {"left_out", "left_out_seconds", "p95_error", "within_tolerance", "baseline", "upload", "rays", "regions_skipped",
-       "max_error", "mrse", "rmse_common", "pages", "border_overhead", "border_formula", "oversampling", "passes"});
+       "max_error", "mrse", "rmse_common", "p95_common", "pages", "border_overhead", "border_formula", "oversampling", "passes"});
   return std::find(on_demand.begin(), on_demand.end(), rule.key) == on_demand.end();
 }
 
@@ -434,6 +429,30 @@ std::vector<Table> make_tables(std::span<const Json> records, const ReportOption
     if (auto split = make_split_table(names.first, names.second, members)) tables.push_back(std::move(*split));
   }
   return tables;
+}
+
+Table make_setting_table(std::string title, std::span<const Json* const> rows, std::span<const Json* const> all,
+                         std::span<const std::string_view> measures) {
+  Table table;
+  table.title = std::move(title);
+  table.rows.resize(rows.size());
+  const Group group{in_order({all.begin(), all.end()}), varying_parameters({all.begin(), all.end()}, true)};
+  const auto add = [&](const ColumnRule& rule) {
+    std::vector<Cell> cells;
+    for (const Json* record : rows) cells.push_back(record != nullptr ? rule.cell(*record, group) : Cell());
+    add_column(table, rule, cells);
+  };
+  for (const ColumnRule& rule : kColumns) {
+    if (rule.role != Role::setting) continue;
+    const std::vector<Cell> cells = column_cells(rule, group);
+    if (!all_equal(cells) || std::string_view(rule.key) == "encoding")
+      add(rule);
+    else if (!all_absent(cells))
+      table.constants.emplace_back(rule.label, format_cell(cells.front()));
+  }
+  for (const std::string_view key : measures) add(find_rule(key));
+  add_constant_parameters(table, group);
+  return table;
 }
 
 std::vector<std::string> read_columns(const std::filesystem::path& path) {

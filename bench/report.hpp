@@ -27,6 +27,11 @@ struct ReportOptions {
 /// linear filters, of another linear one. Throws UsageError for an unknown column.
 std::vector<Table> make_tables(std::span<const Json> records, const ReportOptions& options = {});
 
+/// A row for each of `rows` in their order (null: a row without values): the settings that differ among `all`, then the columns
+/// `measures`. What is the same in all stands above the table. Throws UsageError for an unknown column.
+Table make_setting_table(std::string title, std::span<const Json* const> rows, std::span<const Json* const> all,
+                         std::span<const std::string_view> measures);
+
 /// Keys of all columns with a fixed name.
 std::vector<std::string_view> column_keys();
 /// A JSON list of column keys. Throws UsageError naming file, line and the known keys.

@@ -47,13 +47,34 @@ struct Built {
 struct Failure {
   Status status;
   std::string reason;
+  std::int64_t needed_bytes = 0;  ///< of what is over the budget, where they are known
 };
 
 /// Why a point could not be measured, from the exception that says so.
 Failure failure_of(const std::exception& error) {
   if (dynamic_cast<const UnsupportedError*>(&error) != nullptr) return {Status::unsupported, error.what()};
-  if (dynamic_cast<const BudgetError*>(&error) != nullptr) return {Status::over_budget, error.what()};
+  if (const auto* budget = dynamic_cast<const BudgetError*>(&error))
+    return {Status::over_budget, error.what(), budget->needed_bytes()};
   return {Status::failed, error.what()};
+}
+
+/// Largest difference of the channels of each pixel that is not empty in both pictures, ascending: where the field is small on
+/// the picture, most pixels are empty and exact. One 0 where all are.
+std::vector<double> seen_errors(const Picture& picture, const Picture& reference) {
+  std::vector<double> errors;
+  const auto channels = static_cast<std::size_t>(picture.channels);
+  for (std::size_t pixel = 0; pixel < picture.values.size(); pixel += channels) {
+    double error = 0;
+    bool empty = true;
+    for (std::size_t i = pixel; i < pixel + channels; ++i) {
+      error = std::max(error, std::abs(picture.values[i] - reference.values[i]));
+      empty = empty && picture.values[i] == 0 && reference.values[i] == 0;
+    }
+    if (!empty) errors.push_back(error);
+  }
+  if (errors.empty()) errors.push_back(0);
+  std::sort(errors.begin(), errors.end());
+  return errors;
 }
 
 class Runner {
@@ -97,6 +118,7 @@ class Runner {
     load(build.dataset);
     std::vector<const RenderPoint*> open;
     for (const RenderPoint& render : experiment_.renders) {
+      if (options_.wanted && !options_.wanted(build, render)) continue;
       if (!options_.force && has_record(options_.folder, hash_of(build, render)))
         ++summary_.kept;
       else
@@ -207,6 +229,16 @@ class Runner {
     const ReferenceSettings& reference = *experiment_.reference;
     const fs::path cache = options_.folder / "references";
     std::string hash;
+    if (reference.common_filter) {
+      FilterDefinition common{*reference.common_filter, 0, mesh_->finest_level()};
+      if (common.filter != Filter::linear_page) common.page_level = 0;
+      const Picture shared = cached_reference(*mesh_, common, scene, reference.step, cache, hash);
+      record["error_common"] = error_json(compare(picture, shared), hash);
+      record["error_common"]["p95"] = percentile(pixel_errors(picture, shared), 0.95);
+      record["error_common"]["p95_seen"] = percentile(seen_errors(picture, shared), 0.95);
+      record["error_common"]["filter"] = filter_name(common.filter);
+    }
+    if (!reference.own) return true;
     const Picture own = cached_reference(*mesh_, built.field.definition, scene, reference.step, cache, hash);
     const ErrorMetrics error = compare(picture, own);
     record["error"] = error_json(error, hash);
@@ -215,15 +247,9 @@ class Runner {
       record["error"]["split"]["level_of_detail"] = pruning_error(built, scene, picture);
     const std::vector<double> pixels = pixel_errors(picture, own);
     record["error"]["p95"] = percentile(pixels, 0.95);
+    record["error"]["p95_seen"] = percentile(seen_errors(picture, own), 0.95);
     if (scene.settings.integrator == Integrator::tolerance)
       record["error"]["within_tolerance"] = share_within(pixels, scene.settings.tolerance);
-    if (reference.common_filter) {
-      FilterDefinition common{*reference.common_filter, 0, mesh_->finest_level()};
-      if (common.filter != Filter::linear_page) common.page_level = 0;
-      const Picture shared = cached_reference(*mesh_, common, scene, reference.step, cache, hash);
-      record["error_common"] = error_json(compare(picture, shared), hash);
-      record["error_common"]["filter"] = filter_name(common.filter);
-    }
     if (experiment_.minimum_psnr_db && !reaches_psnr(error, *experiment_.minimum_psnr_db)) {
       record["status"] = status_name(Status::failed);
       record["reason"] = fmt::format("failed check: psnr_db {:.2f} against its own reference, at least {} is asked for",
@@ -293,6 +319,17 @@ class Runner {
     return median(wall);
   }
 
+  /// A baseline that cannot be drawn concerns the whole experiment, not the point that it stands beside.
+  std::unique_ptr<Built> make_baseline(const BuildPoint& build, const Scene& scene) {
+    try {
+      return make(build, scene);
+    } catch (const Error& error) {
+      throw UsageError(fmt::format(
+          "{}: baseline: the first of all points cannot be drawn: {}; accepted: another order of encodings and filters",
+          experiment_.file.string(), error.what()));
+    }
+  }
+
   /// The experiment's first build with its first render settings, for the same view, when it asks for one.
   Consumer* baseline_for(const BuildPoint& build, const RenderPoint& render) {
     if (!experiment_.baseline) return nullptr;
@@ -305,7 +342,7 @@ class Runner {
     settings.transfer_function = render.transfer_function;
     settings.transfer_function_name = render.transfer_function_name;
     const std::string key = render_json(settings).dump();
-    if (!baseline_) baseline_ = make(*first, scene_of(experiment_, settings));
+    if (!baseline_) baseline_ = make_baseline(*first, scene_of(experiment_, settings));
     if (!baseline_consumer_ || key != baseline_key_) {
       baseline_consumer_ = make_consumer(*context_, *mesh_, baseline_->field, *baseline_->gpu, scene_of(experiment_, settings));
       baseline_key_ = key;
@@ -351,6 +388,7 @@ class Runner {
   void record_failure(const BuildPoint& build, const RenderPoint& render, const Failure& failure) {
     Json record = blank_record(failure.status, failure.reason);
     describe(record, build, render, nullptr);
+    if (failure.needed_bytes > 0) record["needed_bytes"] = failure.needed_bytes;
     write(build, render, record);
   }
 

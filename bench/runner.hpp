@@ -19,6 +19,8 @@ struct RunOptions {
   bool force = false;                        ///< measure again what has a record
   std::optional<ContextKind> context;        ///< overrides the experiment's
   std::optional<std::int64_t> memory_limit;  ///< bytes of one build; overrides the experiment's
+  /// Points that are measured; absent: all. Others are passed over as if they were not in the experiment.
+  std::function<bool(const BuildPoint&, const RenderPoint&)> wanted;
   std::function<void(const std::string&)> progress = [](const std::string&) {};
 };
 

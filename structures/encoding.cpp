@@ -186,7 +186,8 @@ void require_budget(const Encoding& encoding, std::int64_t bytes, const BuildReq
   if (bytes > request.memory_limit)
     throw BudgetError(fmt::format("encoding {} with {}: needs {} bytes ({:.1f} MiB), the memory limit is {} bytes ({:.1f} MiB)",
                                   encoding.name(), request.parameters.dump(), bytes, static_cast<double>(bytes) / 1048576.0,
-                                  request.memory_limit, static_cast<double>(request.memory_limit) / 1048576.0));
+                                  request.memory_limit, static_cast<double>(request.memory_limit) / 1048576.0),
+                      bytes);
 }
 
 }  // namespace amrtex

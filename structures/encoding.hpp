@@ -104,6 +104,8 @@ struct ParameterInfo {
   std::string description;  ///< with its unit
   Json default_value;
   std::string accepted;  ///< for error messages: "an integer from 4 to 128"
+  /// Values between which the best depends on mesh and scene: what `amrtex advise` tries. Empty: the default alone.
+  std::vector<Json> compared = {};
 };
 
 /// A value of a parameter that a context cannot take.

@@ -1,6 +1,7 @@
 // The one exception of the libraries, and the two kinds of it that callers treat specially.
 #pragma once
 
+#include <cstdint>
 #include <stdexcept>
 #include <string>
 
@@ -28,7 +29,11 @@ class UnsupportedError : public Error {
 /// More bytes than `--memory-limit` allows, found before anything was allocated; a record `over_budget`.
 class BudgetError : public Error {
  public:
-  using Error::Error;
+  explicit BudgetError(const std::string& what, std::int64_t needed_bytes = 0) : Error(what), needed_bytes_(needed_bytes) {}
+  std::int64_t needed_bytes() const { return needed_bytes_; }  ///< 0 where they are not known
+
+ private:
+  std::int64_t needed_bytes_;
 };
 
 }  // namespace amrtex

@@ -147,7 +147,8 @@ Json one_point() { return with(small_experiment(), "encodings", {{{"name", "page
 // --- usage ---
 
 TEST_F(CommandLine, EveryCommandHasHelpWithAnExample) {
-  for (const std::string command : {"encodings", "doctor", "info", "generate", "convert", "sample", "render", "run", "report", "verify"}) {
+  for (const std::string command :
+       {"encodings", "doctor", "info", "generate", "convert", "sample", "render", "run", "report", "verify", "advise"}) {
     const Result r = amrtex({command, "--help"});
     EXPECT_EQ(r.exit_code, 0) << command;
     EXPECT_THAT(r.out, HasSubstr("Example: amrtex " + command));
@@ -589,6 +590,89 @@ TEST_F(CommandLine, TablesBesideAPaperFollowTheOrdinaryOnes) {
   expect_complaint(amrtex({"report", at("out")}), 2,
                    AllOf(HasSubstr("row 'memory'"), HasSubstr("3 records"), HasSubstr("/encoding")));
   EXPECT_THAT(read_text(at("out") / "table.md"), HasSubstr("### small")) << "the ordinary tables need no tables.json";
+}
+
+TEST_F(CommandLine, WorkPrecisionIsATableAndADiagram) {
+  write_text(at("tables.json"), R"([{"work_precision": {"reach": [20, 200]}}])");
+  const Result r = run(small_experiment());
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(read_text(at("out") / "table.md"), AllOf(HasSubstr("| 20 dB |"), HasSubstr("no setting reaches 200 dB")));
+  const Json diagram = Json::parse(read_text(at("out") / "work_precision_plt00008_view_1_transfer_function_1_dvr.vl.json"));
+  EXPECT_THAT(diagram["vconcat"][0]["data"]["values"], SizeIs(3)) << "a point a structure";
+  write_text(at("tables.json"), R"([{"work_precision": {"reach": "all"}}])");
+  expect_complaint(run(small_experiment()), 2, AllOf(HasSubstr("tables.json:1:"), HasSubstr("reach")));
+}
+
+TEST_F(CommandLine, ABaselineThatCannotBeDrawnIsSaidOnce) {
+  expect_complaint(run(with(with(small_experiment(), "baseline", true), "filters", {"linear_lod", "linear_page"})), 2,
+                   AllOf(HasSubstr("e.json: baseline"), HasSubstr("no filter linear_lod"), HasSubstr("order")));
+}
+
+// --- advise ---
+
+/// Few candidates and small pictures.
+std::vector<std::string> advise_arguments(const std::vector<std::string>& more) {
+  std::vector<std::string> arguments = {"advise",    kData,  "--filter",    "linear_lod", "--reference", "linear_lod",
+                                        "--storage", "r32f", "--filtering", "manual",     "--width",     "64",
+                                        "--height",  "64",   "--frames",    "1"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+TEST_F(CommandLine, AdviseNamesASettingThatReachesTheErrorAndCanBeDrawn) {
+  const Result r =
+      amrtex(advise_arguments({"--tolerance", "0.02", "--memory-limit", "1MiB", "--json", "--scene", at("s.json").string()}));
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.err, IsEmpty()) << "silence in a pipe";
+  const Json json = Json::parse(r.out);
+  const Json& advice = json.at("advice");
+  EXPECT_LE(advice.at("p95").get<double>(), 0.02);
+  EXPECT_GT(advice.at("max").get<double>(), 0);
+  EXPECT_LE(advice.at("bytes").get<std::int64_t>(), 1 << 20);
+  EXPECT_EQ(advice.at("filter"), "linear_lod");
+  EXPECT_FALSE(json.at("lost").empty());
+  EXPECT_EQ(json.at("scene"), Json::parse(read_text(at("s.json"))));
+  const Result drawn = amrtex({"render", at("s.json").string(), "-o", at("s.npy").string()});
+  EXPECT_EQ(drawn.exit_code, 0) << drawn.err;
+  EXPECT_EQ(read_npy(at("s.npy")).width, 64);
+}
+
+TEST_F(CommandLine, AdviseToReadSaysWhatWhyAndWhatElse) {
+  const Result r = amrtex(advise_arguments({"--tolerance", "0.1", "--keep", at("kept").string()}));
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.out, AllOf(StartsWith("Take\n"), HasSubstr("MiB"), HasSubstr("95 % of the pixels"), HasSubstr("Not taken"),
+                           HasSubstr("\"encodings\"")));
+  EXPECT_THAT(load_records(at("kept")), Not(IsEmpty()));
+}
+
+TEST_F(CommandLine, AdviseEndsWithOneWhereNothingIsGoodEnough) {
+  expect_complaint(amrtex(advise_arguments({"--memory-limit", "100"})), 1,
+                   AllOf(HasSubstr("nothing fits into 100 bytes"), HasSubstr("the smallest structure needs")));
+  const Result r = amrtex(advise_arguments({"--tolerance", "1e-9", "--json"}));
+  expect_complaint(r, 1, AllOf(HasSubstr("nothing reaches the error 1e-09"), HasSubstr("the nearest has")));
+  EXPECT_TRUE(Json::parse(r.out).at("advice").is_null());
+}
+
+TEST_F(CommandLine, AdviseRefusesBadUsageBeforeAnyWork) {
+  struct Case {
+    std::vector<std::string> arguments;
+    const char *first, *second;
+  };
+  for (const Case& c : std::initializer_list<Case>{{{"--tolerance", "0"}, "--tolerance 0", "(0, 1]"},
+                                                   {{"--tolerance", "2"}, "--tolerance 2", "(0, 1]"},
+                                                   {{"--memory-limit", "much"}, "much", "512MiB"},
+                                                   {{"--memory-limit", "0"}, "--memory-limit 0", "one byte"},
+                                                   {{"--field", "rho"}, "rho", "phi"},
+                                                   {{"--storage", "r64"}, "r64", "r32f"},
+                                                   {{"--context", "vulkan"}, "vulkan", "osmesa"},
+                                                   {{"--view", "{\"eye\": 3}"}, "views", "'at'"},
+                                                   {{"--transfer-function", "none.json"}, "none.json", "accepted"},
+                                                   {{"--scene", "a.txt"}, "a.txt", ".json"},
+                                                   {{"--scene", "no_folder/a.json"}, "no_folder", "folder"}})
+    expect_complaint(amrtex(advise_arguments(c.arguments)), 2, AllOf(HasSubstr(c.first), HasSubstr(c.second)));
+  expect_complaint(amrtex({"advise", at("nowhere").string()}), 2, HasSubstr("nowhere"));
+  write_text(at("text"), "no mesh");
+  expect_complaint(amrtex({"advise", at("text").string()}), 2, AllOf(HasSubstr("text"), HasSubstr("AMReX")));
 }
 
 TEST_F(CommandLine, ReportNamesABrokenRecord) {

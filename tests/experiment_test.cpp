@@ -236,6 +236,8 @@ TEST(Experiment, ReferenceMayBeOwnOrNoneAtAll) {
   EXPECT_EQ(own.reference->step, 0.25);
   EXPECT_FALSE(own.reference->common_filter);
   EXPECT_EQ(parsed(with("reference", R"({"filter": "basis"})")).reference->common_filter, Filter::basis);
+  EXPECT_TRUE(own.reference->own);
+  EXPECT_FALSE(parsed(with("reference", R"({"own": false})")).reference->own);
 }
 
 TEST(Experiment, KnowsItsLimits) {
@@ -419,6 +421,7 @@ TEST(ExperimentErrors, NameKeyAndWhatIsAccepted) {
       {"reference", R"({"step": 0})", "reference.step:", "above 0"},
       {"reference", R"({"filter": "cubic"})", "reference.filter:", "own, nearest"},
       {"reference", R"({"filters": "own"})", "reference.filters:", "did you mean 'filter'?"},
+      {"reference", R"({"own": false, "filter": "own"})", "reference.own:", "there is no reference"},
       {"context", "\"glx\"", "context:", "egl, egl_device, osmesa"},
       {"memory_limit", "0", "memory_limit:", "from 1"},
       {"baseline", "1", "baseline:", "true or false"},
@@ -489,6 +492,8 @@ TEST(PointConfiguration, ChangesWithMeshSettingsAndReferenceButNotWithNames) {
   const std::string base = hash(kSmall, "mesh");
   EXPECT_NE(hash(kSmall, "other"), base);
   EXPECT_NE(hash(with("reference", "null"), "mesh"), base);
+  EXPECT_EQ(hash(with("reference", R"({"own": true})"), "mesh"), base) << "the default: older records keep their names";
+  EXPECT_NE(hash(with("reference", R"({"own": false})"), "mesh"), base);
   EXPECT_NE(hash(with("seed", "2"), "mesh"), base);
   EXPECT_NE(hash(with("context", "\"osmesa\""), "mesh"), base);
   EXPECT_NE(hash(with("memory_limit", "5"), "mesh"), base);

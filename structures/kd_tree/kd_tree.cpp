@@ -255,7 +255,7 @@ class KdTree final : public Encoding {
   std::span<const Filter> filters() const override { return kFilters; }
   std::vector<ParameterInfo> parameters() const override {
     return {
-        {"storage_kind", "where bricks are stored: in one texture, or each in its own", "pool", "\"pool\" or \"bindless\""},
+        {"storage_kind", "where bricks are stored: in one texture, or each in its own", "pool", "\"pool\" or \"bindless\"", {"pool", "bindless"}},
         {"packing", "how bricks are packed into the pool", "best_fit", "\"best_fit\" or \"nfdh\""},
         {"traversal", "where the search for a leaf starts: at a grid's cell, or at the root", "grid", "\"grid\" or \"restart\""},
         {"wrap", "is what lies outside of all subgrids of a node split off before it is divided among them?", true,

@@ -645,7 +645,7 @@ class Octree final : public Encoding {
   std::string_view name() const override { return "octree"; }
   std::span<const Filter> filters() const override { return kFilters; }
   std::vector<ParameterInfo> parameters() const override {
-    return {{"layout", "what a node is made of", "wide", "\"wide\" or \"rgba8\""},
+    return {{"layout", "what a node is made of", "wide", "\"wide\" or \"rgba8\"", {"wide", "rgba8"}},
             {"traversal", "how a sample finds its cells", "fast", "\"fast\" or \"paper\""},
             {"gradients", "of surfaces that are lit, where the layout has room", "stored", "\"stored\" or \"computed\""},
             {"start_grid", "cells along the longest axis of the grid in place of the upper levels", "auto", kStartGridAccepted}};

@@ -339,9 +339,9 @@ class PageTable final : public Encoding {
   std::string_view name() const override { return "page_table"; }
   std::span<const Filter> filters() const override { return kFilters; }
   std::vector<ParameterInfo> parameters() const override {
-    return {{"page_size", "cells along the edge of a page", 16, "4, 8, 16, 32, 64 or 128"},
+    return {{"page_size", "cells along the edge of a page", 16, "4, 8, 16, 32, 64 or 128", {4, 8, 16, 32, 64}},
             {"centring", "what a texel of a page is: a cell, or a vertex (then the filter is linear_vertex)", "cell",
-             "\"cell\" or \"node\""}};
+             "\"cell\" or \"node\"", {"cell", "node"}}};
   }
   void check_parameters(const Json& parameters) const override { values(parameters); }
   Support supported(const ContextInfo&) const override { return {}; }
