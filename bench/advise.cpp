@@ -20,6 +20,7 @@ constexpr int kCoarseShare = 4;       ///< of the full picture's width and heigh
 constexpr int kLeastCoarseEdge = 64;  ///< pixels
 constexpr int kCoarseFrames = 3;
 constexpr double kCoarseSlack = 1.3;         ///< a structure is dropped where its small picture misses the tolerance by more
+constexpr std::size_t kCoarseShapes = 8;     ///< structures tried with all storages and filterings
 constexpr std::size_t kCoarseBuilds = 8;     ///< structures drawn with all steps
 constexpr std::size_t kCarefulSettings = 8;  ///< settings measured at full size, at a time
 constexpr int kCarefulRounds = 3;
@@ -43,6 +44,11 @@ double number_at(const Json& record, const std::string& pointer) {
 std::string build_key(const BuildPoint& b) {
   return fmt::format("{} {} {} {} {}", b.encoding, b.parameters.dump(), filter_name(b.filter), format_name(b.storage),
                      filtering_name(b.filtering));
+}
+
+/// Alike but for storage and filtering.
+std::string shape_key(const BuildPoint& b) {
+  return fmt::format("{} {} {}", b.encoding, b.parameters.dump(), filter_name(b.filter));
 }
 
 std::string settings_key(const RenderSettings& settings) {
@@ -95,11 +101,16 @@ class Search {
   }
 
   Advice run() {
-    std::vector<Candidate> finest;
-    for (const BuildPoint& build : candidate_builds(request_)) finest.push_back({build, finest_settings()});
-    const std::vector<MeasuredCandidate> reaching = within_slack(measured(finest, coarse_, "structures"));
-    const std::vector<MeasuredCandidate> steps = measured(with_all_settings(best_builds(reaching)), coarse_, "steps");
-    measure_carefully(steps);
+    std::map<std::string, std::vector<BuildPoint>> shapes;
+    for (const BuildPoint& build : candidate_builds(request_)) shapes[shape_key(build)].push_back(build);
+    const std::vector<MeasuredCandidate> first = one_of_each_shape(shapes);
+    const std::vector<BuildPoint> best = fastest_builds(within_slack(first), kCoarseShapes);
+    std::vector<MeasuredCandidate> builds = measured(other_variants(best, shapes), coarse_, "storages and filterings");
+    for (const MeasuredCandidate& m : first)
+      if (std::any_of(best.begin(), best.end(), [&](const auto& b) { return build_key(b) == build_key(m.candidate.build); }))
+        builds.push_back(m);
+    measure_carefully(measured(with_all_settings(fastest_builds(within_slack(builds), kCoarseBuilds)), coarse_, "steps"));
+    pass_reasons_on(shapes);
     conclude();
     return std::move(advice_);
   }
@@ -107,14 +118,60 @@ class Search {
  private:
   static int coarse_edge(int full) { return std::min(full, std::max(kLeastCoarseEdge, full / kCoarseShare)); }
 
+  /// Each shape in the first storage that fits, with the finest steps: what that cannot reach, no other storage reaches.
+  std::vector<MeasuredCandidate> one_of_each_shape(const std::map<std::string, std::vector<BuildPoint>>& shapes) {
+    std::vector<MeasuredCandidate> all;
+    std::set<std::string> fitting;
+    for (const Storage storage : request_.storages) {
+      std::vector<Candidate> next;
+      for (const auto& [shape, builds] : shapes) {
+        if (fitting.contains(shape)) continue;
+        const auto build = std::find_if(builds.begin(), builds.end(), [&](const BuildPoint& b) { return b.storage == storage; });
+        if (build != builds.end()) next.push_back({*build, finest_settings()});
+      }
+      for (MeasuredCandidate& m : measured(next, coarse_, format_name(storage))) {
+        fitting.insert(shape_key(m.candidate.build));
+        all.push_back(std::move(m));
+      }
+    }
+    return all;
+  }
+
+  /// The other storages and filterings of builds, but for those whose storage is known not to fit.
+  std::vector<Candidate> other_variants(const std::vector<BuildPoint>& of,
+                                        const std::map<std::string, std::vector<BuildPoint>>& shapes) const {
+    std::vector<Candidate> all;
+    for (const BuildPoint& build : of)
+      for (const BuildPoint& other : shapes.at(shape_key(build)))
+        if (build_key(other) != build_key(build) && !too_large_.contains(storage_key(other)))
+          all.push_back({other, finest_settings()});
+    return all;
+  }
+
+  static std::string storage_key(const BuildPoint& b) { return shape_key(b) + " " + std::string(format_name(b.storage)); }
+
+  /// A shape that was left behind takes its other storages and filterings along.
+  void pass_reasons_on(const std::map<std::string, std::vector<BuildPoint>>& shapes) {
+    for (const auto& [shape, builds] : shapes)
+      for (const BuildPoint& known : builds) {
+        const auto reason = reasons_.find(build_key(known));
+        if (reason == reasons_.end()) continue;
+        const std::string text = reason->second.reason;
+        for (const BuildPoint& other : builds)
+          if (!tried_.contains(build_key(other)) && !too_large_.contains(storage_key(other))) lose(other, text);
+        break;
+      }
+  }
+
   /// Those that were measured; others are remembered as refused.
-  std::vector<MeasuredCandidate> measured(const std::vector<Candidate>& candidates, const Effort& effort, const char* what) {
+  std::vector<MeasuredCandidate> measured(const std::vector<Candidate>& candidates, const Effort& effort, std::string_view what) {
     if (candidates.empty()) return {};
     progress_(fmt::format("{} {} at {} x {} pixels", candidates.size(), what, effort.width, effort.height));
     const std::vector<Json> records = measure_(candidates, effort);
     std::vector<MeasuredCandidate> list;
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       note_bytes(records[i]);
+      tried_.insert(build_key(candidates[i].build));
       if (const auto r = reading_of(records[i], request_)) {
         list.push_back({candidates[i], r->frame_ms, r->error, r->max_error, r->bytes});
         ++advice_.pictures;
@@ -138,6 +195,7 @@ class Search {
         value_at(record, "/reason").is_string() ? value_at(record, "/reason").get<std::string>() : "no error or time";
     // one line for all sizes: what they need differs
     const double needed = number_at(record, "/needed_bytes");
+    if (needed > 0) too_large_.insert(storage_key(candidate.build));
     if (needed > 0)
       reason = fmt::format("needs {:.1f} x the memory limit or more", needed / static_cast<double>(request_.memory_limit));
     for (Refusal& r : advice_.refused)
@@ -171,7 +229,7 @@ class Search {
   }
 
   /// The fastest of each encoding and filter, then the fastest of all.
-  std::vector<BuildPoint> best_builds(std::vector<MeasuredCandidate> all) {
+  std::vector<BuildPoint> fastest_builds(std::vector<MeasuredCandidate> all, std::size_t most) {
     std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.frame_ms < b.frame_ms; });
     std::set<std::pair<std::string, Filter>> seen;
     std::vector<MeasuredCandidate> order, others;
@@ -180,7 +238,7 @@ class Search {
     order.insert(order.end(), others.begin(), others.end());
     std::vector<BuildPoint> best;
     for (const MeasuredCandidate& m : order) {
-      if (best.size() < kCoarseBuilds)
+      if (best.size() < most)
         best.push_back(m.candidate.build);
       else
         lose(m.candidate.build, slower_text(m.frame_ms, all.front().frame_ms) + " on a small picture");
@@ -295,6 +353,8 @@ class Search {
   const std::function<void(const std::string&)>& progress_;
   Advice advice_;
   std::map<std::string, Loss> reasons_;         ///< by structure
+  std::set<std::string> tried_;                 ///< structures
+  std::set<std::string> too_large_;             ///< shapes and storages that pass the limit
   std::map<std::string, double> least_needed_;  ///< bytes, of those over the limit, by encoding
 };
 

@@ -83,8 +83,9 @@ std::vector<BuildPoint> candidate_builds(const AdviceRequest& request);
 /// Ways to draw that are worth trying, from the fastest to the most exact of each integrator.
 std::vector<RenderSettings> candidate_settings(const AdviceRequest& request);
 
-/// Measures all structures with small pictures and a fine step, the best of them with all steps, and the best settings
-/// at the effort `full`. `progress` hears what goes on. Throws UsageError for a tolerance outside of (0, 1].
+/// Measures small pictures with a fine step: every encoding, parameter and filter in the first storage that fits, then the
+/// best of them in all storages and filterings, then the best of those with all steps; and the best settings at the effort
+/// `full`. `progress` hears what goes on. Throws UsageError for a tolerance outside of (0, 1].
 Advice advise(
     const AdviceRequest& request, const Effort& full, const Measure& measure,
     const std::function<void(const std::string&)>& progress = [](const std::string&) {});
