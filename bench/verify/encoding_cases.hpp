@@ -6,6 +6,8 @@
 
 #include <array>
 #include <cctype>
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -38,6 +40,7 @@ struct BuildOptions {
   bool level_of_detail = false;
   bool everything = false;
   std::vector<std::array<double, 2>> invisible = {};
+  std::int64_t memory_limit = std::numeric_limits<std::int64_t>::max();  ///< bytes
 };
 
 /// What a context says of handles of textures, and no other limit of it.
@@ -64,6 +67,7 @@ inline EncodedField build(const AmrHierarchy& h, const EncodingCase& c, const Bu
   request.needs.everything = options.everything;
   request.needs.invisible = options.invisible;
   request.parameters = c.parameters;
+  request.memory_limit = options.memory_limit;
   request.context = options.limits.value_or(c.limits);
   return c.encoding->build(h, request);
 }
