@@ -32,11 +32,15 @@ void write_file(const std::filesystem::path& path, const std::string& text) {
   if (!file.flush()) throw Error(fmt::format("{}: cannot be written", path.string()));
 }
 
-/// DIR/verify.json; table.md, the list and what was skipped; cases.csv, every case.
-void write_folder(const std::filesystem::path& folder, const verify::Report& report, const Json& json, const Context& gl) {
+/// Before minutes of work, not after them.
+void make_folder(const std::filesystem::path& folder) {
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed) throw Error(fmt::format("{}: cannot be made: {}", folder.string(), failed.message()));
+}
+
+/// DIR/verify.json; table.md, the list and what was skipped; cases.csv, every case.
+void write_folder(const std::filesystem::path& folder, const verify::Report& report, const Json& json, const Context& gl) {
   write_file(folder / "verify.json", json.dump() + "\n");
   write_file(folder / "table.md", fmt::format("{}\n\n{}\n{}\n{}\n", summary(report, gl), to_markdown(verify::coverage(report)),
                                               to_markdown(verify::ranges(report)), to_markdown(verify::skipped(report))));
@@ -48,6 +52,7 @@ int run(const Arguments& a) {
   for (const std::string& name : a.suites) chosen.push_back(&verify::find_suite(name));
   if (chosen.empty())
     for (const verify::Suite& s : verify::suites()) chosen.push_back(&s);
+  if (!a.output.empty()) make_folder(a.output);
   verify::VerifyOptions options;
   options.context = parse_context_kind(a.context);
   options.full = a.full;

@@ -147,7 +147,8 @@ Json one_point() { return with(small_experiment(), "encodings", {{{"name", "page
 // --- usage ---
 
 TEST_F(CommandLine, EveryCommandHasHelpWithAnExample) {
-  for (const std::string command : {"encodings", "doctor", "info", "generate", "convert", "sample", "render", "run", "report", "verify"}) {
+  for (const std::string command :
+       {"encodings", "doctor", "info", "generate", "convert", "sample", "render", "run", "report", "verify"}) {
     const Result r = amrtex({command, "--help"});
     EXPECT_EQ(r.exit_code, 0) << command;
     EXPECT_THAT(r.out, HasSubstr("Example: amrtex " + command));
@@ -205,7 +206,7 @@ TEST_F(CommandLine, VerifyRefusesUnknownSuitesAndContexts) {
 }
 
 TEST_F(CommandLine, VerifyWritesCasesAsJson) {
-  const Result r = amrtex({"verify", "--suite", "stiff", "--json", "--context", "osmesa"});
+  const Result r = amrtex({"verify", "--suite", "stiff", "--json", "--context", "osmesa", "--out", at("verify").string()});
   ASSERT_EQ(r.exit_code, 0) << r.err;
   EXPECT_THAT(r.err, IsEmpty());
   const Json json = Json::parse(r.out);
@@ -216,6 +217,15 @@ TEST_F(CommandLine, VerifyWritesCasesAsJson) {
     for (const char* key : {"name", "encoding", "filter", "expected", "observed"}) EXPECT_TRUE(c.contains(key)) << key;
   }
   for (const Json& s : json["skipped"]) EXPECT_FALSE(s["reason"].get<std::string>().empty());
+  EXPECT_EQ(Json::parse(read_text(at("verify") / "verify.json")), json);
+  EXPECT_THAT(read_text(at("verify") / "table.md"),
+              AllOf(HasSubstr(json["context"]["renderer"].get<std::string>()), HasSubstr("| 20 |")));
+  EXPECT_THAT(read_text(at("verify") / "cases.csv"), HasSubstr("stiff,"));
+}
+
+TEST_F(CommandLine, VerifyRefusesAFolderThatCannotBeBeforeItWorks) {
+  write_text(at("file"), "");
+  expect_complaint(amrtex({"verify", "--out", (at("file") / "in").string()}), 1, HasSubstr("cannot be made"));
 }
 
 TEST_F(CommandLine, MissingDataIsSaidClearly) {
