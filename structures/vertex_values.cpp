@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "level_values.hpp"
@@ -58,22 +59,13 @@ double mean_around(const Vec3i& vertex, const Box& cells, std::span<const double
   return mean.value();
 }
 
-/// Vertices of one level, all that a box of finer cells lies between.
-struct CoarseVertices {
-  int ratio;  ///< of cell widths
+/// Vertices of one level.
+struct LevelVertices {
   Box box;
   std::vector<double> values;
 
-  CoarseVertices(const AmrHierarchy& h, int field, int level, int finer, const Box& finer_cells)
-      : ratio(h.cell_width(level) / h.cell_width(finer)) {
-    const Box cells = finer_cells.coarsened(ratio);
-    box = {cells.lower, cells.upper + Vec3i(1)};
-    values.resize(static_cast<std::size_t>(box.cells()));
-    vertex_values(h, field, level, box, values);
-  }
-
-  /// The trilinear interpolant of a cell at a vertex of the finer level.
-  double interpolate(const Vec3i& cell, const Vec3i& vertex) const {
+  /// The trilinear interpolant of a cell at a vertex of a finer level, whose cells are 1 / `ratio` as wide.
+  double interpolate(int ratio, const Vec3i& cell, const Vec3i& vertex) const {
     const Vec3d f = Vec3d(vertex - cell * ratio) / static_cast<double>(ratio);
     double first = kNone;  // the sum is taken about it: constants are kept to the bit
     double sum = 0;
@@ -88,32 +80,73 @@ struct CoarseVertices {
   }
 };
 
+/// The vertices of a box and those of coarser levels that they may ask for. Each level is computed once, when it is first
+/// met: asked from every finer level anew, the work would double with each level.
+class VerticesAndCoarser {
+ public:
+  VerticesAndCoarser(const AmrHierarchy& h, int field, int level, const Box& vertices)
+      : h_(&h), field_(field), reach_(static_cast<std::size_t>(level) + 1, Box{vertices.lower, vertices.lower}) {
+    reach_.back() = vertices;
+    for (int l = level; l > 0; --l)
+      for (int m = 0; m < l; ++m) widen(m, around(l).coarsened(ratio(m, l)));
+  }
+
+  void compute(int level, std::span<double> out) {
+    const Box& vertices = reach(level);
+    const Box cells{vertices.lower - Vec3i(1), vertices.upper};
+    std::vector<double> values(static_cast<std::size_t>(cells.cells()));
+    filled_level_values(*h_, field_, level, cells, values);
+    const std::vector<int> holding = holding_levels(*h_, field_, level, cells);
+    std::size_t i = 0;
+    for_each_cell(vertices, [&](const Vec3i& vertex) {
+      int coarsest = level;
+      Vec3i cell{0};
+      for_each_cell({vertex - Vec3i(1), vertex + Vec3i(1)}, [&](const Vec3i& c) {
+        const int l = holding[cells.offset(c)];
+        if (l >= coarsest) return;
+        coarsest = l;
+        cell = c;
+      });
+      const int r = ratio(coarsest, level);
+      out[i++] = coarsest == level ? mean_around(vertex, cells, values) : coarser(coarsest).interpolate(r, cell / r, vertex);
+    });
+  }
+
+ private:
+  int ratio(int coarse, int fine) const { return h_->cell_width(coarse) / h_->cell_width(fine); }
+  Box& reach(int level) { return reach_[static_cast<std::size_t>(level)]; }
+
+  /// The cells of the domain around all vertices of a level.
+  Box around(int level) { return intersection({reach(level).lower - Vec3i(1), reach(level).upper}, h_->domain(level)); }
+
+  /// Adds the vertices of these cells.
+  void widen(int level, const Box& cells) {
+    if (cells.empty()) return;
+    Box& box = reach(level);
+    const Box more{cells.lower, cells.upper + Vec3i(1)};
+    box = box.empty() ? more : Box{glm::min(box.lower, more.lower), glm::max(box.upper, more.upper)};
+  }
+
+  const LevelVertices& coarser(int level) {
+    const auto [found, fresh] = coarser_.try_emplace(level);
+    if (fresh) {
+      std::vector<double> values(static_cast<std::size_t>(reach(level).cells()));
+      compute(level, values);
+      found->second = {reach(level), std::move(values)};
+    }
+    return found->second;
+  }
+
+  const AmrHierarchy* h_;
+  int field_;
+  std::vector<Box> reach_;  ///< vertices, a level
+  std::map<int, LevelVertices> coarser_;
+};
+
 }  // namespace
 
 void vertex_values(const AmrHierarchy& h, int field, int level, const Box& vertices, std::span<double> out) {
-  const Box cells{vertices.lower - Vec3i(1), vertices.upper};
-  std::vector<double> values(static_cast<std::size_t>(cells.cells()));
-  filled_level_values(h, field, level, cells, values);
-  const std::vector<int> holding = holding_levels(h, field, level, cells);
-  std::map<int, CoarseVertices> coarser;  // by level, made when first met
-  std::size_t i = 0;
-  for_each_cell(vertices, [&](const Vec3i& vertex) {
-    int coarsest = level;
-    Vec3i cell{0};
-    for_each_cell({vertex - Vec3i(1), vertex + Vec3i(1)}, [&](const Vec3i& c) {
-      const int l = holding[cells.offset(c)];
-      if (l >= coarsest) return;
-      coarsest = l;
-      cell = c;
-    });
-    if (coarsest == level) {
-      out[i++] = mean_around(vertex, cells, values);
-      return;
-    }
-    const auto found = coarser.try_emplace(coarsest, h, field, coarsest, level, intersection(cells, h.domain(level))).first;
-    const CoarseVertices& v = found->second;
-    out[i++] = v.interpolate(cell / v.ratio, vertex);
-  });
+  VerticesAndCoarser(h, field, level, vertices).compute(level, out);
 }
 
 }  // namespace amrtex

@@ -206,7 +206,7 @@ TEST_F(CommandLine, VerifyRefusesUnknownSuitesAndContexts) {
 }
 
 TEST_F(CommandLine, VerifyWritesCasesAsJson) {
-  const Result r = amrtex({"verify", "--suite", "stiff", "--json", "--context", "osmesa"});
+  const Result r = amrtex({"verify", "--suite", "stiff", "--json", "--context", "osmesa", "--out", at("verify").string()});
   ASSERT_EQ(r.exit_code, 0) << r.err;
   EXPECT_THAT(r.err, IsEmpty());
   const Json json = Json::parse(r.out);
@@ -217,6 +217,15 @@ TEST_F(CommandLine, VerifyWritesCasesAsJson) {
     for (const char* key : {"name", "encoding", "filter", "expected", "observed"}) EXPECT_TRUE(c.contains(key)) << key;
   }
   for (const Json& s : json["skipped"]) EXPECT_FALSE(s["reason"].get<std::string>().empty());
+  EXPECT_EQ(Json::parse(read_text(at("verify") / "verify.json")), json);
+  EXPECT_THAT(read_text(at("verify") / "table.md"),
+              AllOf(HasSubstr(json["context"]["renderer"].get<std::string>()), HasSubstr("| 20 |")));
+  EXPECT_THAT(read_text(at("verify") / "cases.csv"), HasSubstr("stiff,"));
+}
+
+TEST_F(CommandLine, VerifyRefusesAFolderThatCannotBeBeforeItWorks) {
+  write_text(at("file"), "");
+  expect_complaint(amrtex({"verify", "--out", (at("file") / "in").string()}), 1, HasSubstr("cannot be made"));
 }
 
 TEST_F(CommandLine, MissingDataIsSaidClearly) {

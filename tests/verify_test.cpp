@@ -5,12 +5,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
+#include <set>
 #include <vector>
 
 namespace amrtex::verify {
 namespace {
 
 using testing::HasSubstr;
+using testing::IsSupersetOf;
 
 Report run(const char* suite, VerifyOptions options = {}) {
   Report report;
@@ -68,12 +71,13 @@ TEST(Verify, RefusalsAreSkippedErrorsFail) {
   Report report;
   VerifyContext context({}, report);
   context.begin("a suite");
-  context.for_each("a case", std::span(context.filters()).first(3), [&](const EncodingCase& c) -> std::optional<Check> {
+  context.for_each("a case", std::span(context.filters()).first(3), [&](const EncodingCase& c) -> Verdict {
     if (&c == &context.filters()[0]) throw UnsupportedError("cannot");
     if (&c == &context.filters()[1]) throw Error("broken");
-    return std::nullopt;
+    return NotAsked{"of others"};
   });
-  ASSERT_EQ(report.skipped.size(), 1u);
+  ASSERT_EQ(report.skipped.size(), 2u);
+  EXPECT_EQ(report.skipped[1].reason, "of others");
   EXPECT_EQ(report.skipped[0].reason, "cannot");
   ASSERT_EQ(report.cases.size(), 1u);
   EXPECT_EQ(report.failed(), 1u);
@@ -93,6 +97,69 @@ TEST(Verify, EveryEncodingAndFilterTakesPart) {
                               [&](const EncodingCase& c) { return c.encoding == e && c.filter == filter; }),
                 1)
           << e->name() << " " << filter_name(filter);
+}
+
+/// What all suites would ask, without asking it.
+Report listed() {
+  Report report;
+  VerifyContext context({.list = true}, report);
+  for (const Suite& s : suites()) {
+    context.begin(std::string(s.name));
+    s.run(context);
+  }
+  return report;
+}
+
+// What is asked of no encoding is a file's, 27. A case is reported as passed, failed or skipped with a reason for each
+// encoding and filter that it is given (above): so no number can be missing in silence where it is given all of them.
+TEST(Verify, EachNumberOfTheListIsAskedOfEveryEncodingAndFilter) {
+  const Report report = listed();
+  EXPECT_TRUE(report.cases.empty());
+  std::map<int, std::set<std::string>> asked;
+  for (const Skipped& s : report.skipped) {
+    EXPECT_GE(list_number(s.name), 1) << s.name;
+    EXPECT_LE(list_number(s.name), kListed) << s.name;
+    asked[list_number(s.name)].insert(s.encoding + " " + s.filter);
+  }
+  for (int number = 1; number <= kListed; ++number) {
+    if (number == 27) {
+      EXPECT_TRUE(asked[number].contains(" "));
+      continue;
+    }
+    for (const Encoding* e : all_encodings())
+      for (const Filter filter : e->filters())
+        EXPECT_TRUE(asked[number].contains(fmt::format("{} {}", e->name(), filter_name(filter))))
+            << number << " " << e->name() << " " << filter_name(filter);
+  }
+}
+
+// A wrong method for each of the mistakes that the list is there to find.
+TEST(Verify, ControlsAreListed) {
+  const Report report = listed();
+  std::set<int> with_control;
+  std::string names;
+  for (const Skipped& s : report.skipped)
+    if (is_control(s.name)) {
+      with_control.insert(list_number(s.name));
+      names += s.name + "\n";
+    }
+  EXPECT_THAT(with_control, IsSupersetOf({1, 2, 3, 4, 5, 6, 10, 11, 14, 15, 19, 20, 22, 23, 24, 25}));
+  for (const char* mistake : {"euler", "left", "straddle", "filters that jump", "RGBA8", "without its last part"})
+    EXPECT_THAT(names, HasSubstr(mistake));
+}
+
+TEST(Verify, CoverageTellsPassedFailedAndSkippedApart) {
+  Report report;
+  report.cases.push_back({"s", "3 a", "octree", "nearest", {}, {"", "", true}});
+  report.cases.push_back({"s", "3 control: b", "octree", "nearest", {}, {"", "", true}});
+  report.cases.push_back({"s", "4 c", "octree", "nearest", {}, {"", "", false}});
+  report.cases.push_back({"s", "27 d", "", "", {}, {"", "", true}});
+  report.skipped.push_back({"s", "5 e", "octree", "nearest", "why"});
+  const std::string text = to_csv(coverage(report));
+  EXPECT_THAT(text, HasSubstr("3,1,,2"));
+  EXPECT_THAT(text, HasSubstr("4,,,1 of 1 FAIL"));
+  EXPECT_THAT(text, HasSubstr("5,,,skipped"));
+  EXPECT_THAT(text, HasSubstr("27,,1,"));
 }
 
 TEST(Verify, BrokenEncodingsAreNoticed) {

@@ -6,6 +6,8 @@
 
 #include <array>
 #include <cctype>
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -41,6 +43,7 @@ struct BuildOptions {
   bool border = false;
   bool gradients = false;
   std::vector<std::array<double, 2>> invisible = {};
+  std::int64_t memory_limit = std::numeric_limits<std::int64_t>::max();  ///< bytes
 };
 
 /// What a context says of handles of textures, and no other limit of it.
@@ -69,6 +72,7 @@ inline BuildRequest build_request(const EncodingCase& c, const BuildOptions& opt
   request.needs.gradients = options.gradients;
   request.needs.invisible = options.invisible;
   request.parameters = c.parameters;
+  request.memory_limit = options.memory_limit;
   request.context = options.limits.value_or(c.limits);
   return request;
 }

@@ -145,7 +145,7 @@ void check_places(VerifyContext& v) {
   const AmrHierarchy h = MeshBuilder(Vec3i(16)).root(f).hierarchy();
   const std::vector<NamedView> all = views();
   v.for_each_filter("14 integrals of a linear field against the reference, all views, adaptive, CPU float",
-                    [&](const EncodingCase& c) -> std::optional<Check> {
+                    [&](const EncodingCase& c) -> Verdict {
                       const EncodedField field = v.build(h, c);
                       const HierarchyReference reference(h, 0, field.definition);
                       Check result = at_most(0, 1e-3);

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
+#include <map>
 
 namespace amrtex::verify {
 namespace {
@@ -28,6 +30,29 @@ std::string parameters_text(const Json& parameters) {
 }
 
 Cell text_or_none(const std::string& text) { return text.empty() ? Cell() : Cell(text); }
+
+std::string who(std::string_view encoding, std::string_view filter) {
+  return encoding.empty() ? "" : fmt::format("{} {}", encoding, filter);
+}
+
+std::vector<Column> case_columns() {
+  return {{"name", "case", "", false},     {"encoding", "encoding", "", false}, {"parameters", "parameters", "", false},
+          {"filter", "filter", "", false}, {"expected", "expected", "", false}, {"observed", "observed", "", false},
+          {"pass", "pass", "", false}};
+}
+std::vector<Cell> case_row(const Outcome& o) {
+  return {o.name,           text_or_none(o.encoding), text_or_none(parameters_text(o.parameters)), text_or_none(o.filter),
+          o.check.expected, o.check.observed,         std::string(o.check.pass ? "yes" : "NO")};
+}
+
+struct Tally {
+  int passed = 0, failed = 0, skipped = 0;
+  std::string text() const {
+    if (failed > 0) return fmt::format("{} of {} FAIL", failed, passed + failed);
+    if (passed > 0) return fmt::format("{}", passed);
+    return skipped > 0 ? "skipped" : "";
+  }
+};
 
 }  // namespace
 
@@ -66,7 +91,9 @@ VerifyContext::~VerifyContext() = default;
 EncodedField VerifyContext::build(const AmrHierarchy& mesh, const EncodingCase& c, const BuildOptions& options) const {
   const Support support = c.encoding->supported(gl_->info());
   if (!support.ok) throw UnsupportedError(support.reason);
-  EncodedField field = verify::build(mesh, c, options);
+  BuildOptions limited = options;
+  limited.memory_limit = kMemoryLimit;
+  EncodedField field = verify::build(mesh, c, limited);
   if (options_.tamper) options_.tamper(field);
   return field;
 }
@@ -89,7 +116,11 @@ void VerifyContext::tell(const std::string& name) const {
 void VerifyContext::for_each(const std::string& name, std::span<const EncodingCase> cases, const Body& body) {
   tell(name);
   for (const EncodingCase& c : cases) try {
-      if (const auto check = body(c)) add(name, &c, *check);
+      const Verdict verdict = options_.list ? NotAsked{"listed"} : body(c);
+      if (const Check* check = std::get_if<Check>(&verdict))
+        add(name, &c, *check);
+      else
+        skip(name, &c, std::get<NotAsked>(verdict).why);
     } catch (const UnsupportedError& e) {
       skip(name, &c, e.what());
     } catch (const BudgetError& e) {
@@ -101,6 +132,7 @@ void VerifyContext::for_each(const std::string& name, std::span<const EncodingCa
 
 void VerifyContext::once(const std::string& name, const std::function<Check()>& body) {
   tell(name);
+  if (options_.list) return skip(name, nullptr, "listed");
   try {
     add(name, nullptr, body());
   } catch (const std::exception& e) {
@@ -141,32 +173,115 @@ Json to_json(const Report& report) {
 }
 
 std::vector<Table> to_tables(const Report& report) {
-  std::vector<Table> tables;
+  std::vector<Table> tables{coverage(report)};
   for (const Suite& suite : kSuites) {
     Table table;
     table.title = fmt::format("{}: {}", suite.name, suite.asks);
-    table.columns = {
-        {"name", "case", "", false},     {"encoding", "encoding", "", false}, {"parameters", "parameters", "", false},
-        {"filter", "filter", "", false}, {"expected", "expected", "", false}, {"observed", "observed", "", false},
-        {"pass", "pass", "", false}};
+    table.columns = case_columns();
     for (const Outcome& o : report.cases)
-      if (o.suite == suite.name)
-        table.rows.push_back({o.name, text_or_none(o.encoding), text_or_none(parameters_text(o.parameters)),
-                              text_or_none(o.filter), o.check.expected, o.check.observed,
-                              std::string(o.check.pass ? "yes" : "NO")});
+      if (o.suite == suite.name) table.rows.push_back(case_row(o));
     if (!table.rows.empty()) tables.push_back(std::move(table));
   }
-  Table skipped;
-  skipped.title = "skipped";
-  skipped.columns = {{"suite", "suite", "", false},
-                     {"name", "case", "", false},
-                     {"encoding", "encoding", "", false},
-                     {"filter", "filter", "", false},
-                     {"reason", "reason", "", false}};
-  for (const Skipped& s : report.skipped)
-    skipped.rows.push_back({s.suite, s.name, text_or_none(s.encoding), text_or_none(s.filter), s.reason});
-  if (!skipped.rows.empty()) tables.push_back(std::move(skipped));
+  if (!report.skipped.empty()) tables.push_back(skipped(report));
   return tables;
+}
+
+int list_number(std::string_view name) {
+  int number = 0;
+  std::from_chars(name.data(), name.data() + name.size(), number);
+  return number;
+}
+
+bool is_control(std::string_view name) { return name.find(" control: ") != std::string_view::npos; }
+
+Table coverage(const Report& report) {
+  std::vector<std::string> columns;  // "" first: cases without encodings
+  std::map<std::string, std::map<int, Tally>> tallies;
+  const auto tally = [&](const auto& row) -> Tally& {
+    const std::string column = who(row.encoding, row.filter);
+    if (!tallies.contains(column)) columns.push_back(column);
+    return tallies[column][list_number(row.name)];
+  };
+  for (const Outcome& o : report.cases) ++(o.check.pass ? tally(o).passed : tally(o).failed);
+  for (const Skipped& s : report.skipped) ++tally(s).skipped;
+  std::stable_partition(columns.begin(), columns.end(), [](const std::string& c) { return c.empty(); });
+
+  Table table;
+  table.title = "the list: cases passed, by number";
+  table.columns = {{"number", "number", "", true}, {"controls", "of these controls", "", true}};
+  for (const std::string& c : columns) table.columns.push_back({c, c.empty() ? "no encoding" : c, "", true});
+  for (int number = 1; number <= kListed; ++number) {
+    const auto controls = std::count_if(report.cases.begin(), report.cases.end(), [&](const Outcome& o) {
+      return list_number(o.name) == number && o.check.pass && is_control(o.name);
+    });
+    std::vector<Cell> row{static_cast<std::int64_t>(number), controls > 0 ? Cell(static_cast<std::int64_t>(controls)) : Cell()};
+    bool asked = false;
+    for (const std::string& c : columns) {
+      row.push_back(text_or_none(tallies[c][number].text()));
+      asked = asked || row.back().index() != 0;
+    }
+    if (asked) table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+Table skipped(const Report& report) {
+  Table table;
+  table.title = "skipped";
+  table.columns = {{"suite", "suite", "", false},
+                   {"name", "case", "", false},
+                   {"who", "encodings and filters", "", false},
+                   {"reason", "reason", "", false}};
+  std::vector<std::pair<const Skipped*, std::vector<std::string>>> rows;
+  for (const Skipped& s : report.skipped) {
+    auto row = std::find_if(rows.begin(), rows.end(), [&](const auto& r) {
+      return r.first->suite == s.suite && r.first->name == s.name && r.first->reason == s.reason;
+    });
+    if (row == rows.end()) row = rows.insert(rows.end(), {&s, {}});
+    const std::string one = who(s.encoding, s.filter);
+    if (std::find(row->second.begin(), row->second.end(), one) == row->second.end()) row->second.push_back(one);
+  }
+  for (const auto& [s, all] : rows)
+    table.rows.push_back({s->suite, s->name, text_or_none(fmt::format("{}", fmt::join(all, ", "))), s->reason});
+  return table;
+}
+
+Table ranges(const Report& report) {
+  Table table;
+  table.title = "cases over all encodings and filters";
+  table.columns = {{"suite", "suite", "", false},
+                   {"name", "case", "", false},
+                   {"passed", "passed", "", true},
+                   {"expected", "expected", "", false},
+                   {"observed", "observed, first", "", false},
+                   {"observed_last", "last", "", false}};
+  std::map<std::string, std::size_t> rows;
+  std::vector<std::array<std::int64_t, 2>> counts;
+  for (const Outcome& o : report.cases) {
+    const auto [row, fresh] = rows.emplace(o.suite + "/" + o.name + "/" + o.check.expected, table.rows.size());
+    if (fresh) {
+      table.rows.push_back({o.suite, o.name, Cell(), o.check.expected, o.check.observed, Cell()});
+      counts.push_back({0, 0});
+    } else {
+      table.rows[row->second].back() = o.check.observed;
+    }
+    counts[row->second][0] += o.check.pass ? 1 : 0;
+    ++counts[row->second][1];
+  }
+  for (std::size_t i = 0; i < counts.size(); ++i) table.rows[i][2] = fmt::format("{} of {}", counts[i][0], counts[i][1]);
+  return table;
+}
+
+Table all_cases(const Report& report) {
+  Table table;
+  table.columns = case_columns();
+  table.columns.insert(table.columns.begin(), {"suite", "suite", "", false});
+  for (const Outcome& o : report.cases) {
+    std::vector<Cell> row = case_row(o);
+    row.insert(row.begin(), o.suite);
+    table.rows.push_back(std::move(row));
+  }
+  return table;
 }
 
 double observed_order(std::span<const double> errors) {

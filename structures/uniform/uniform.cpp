@@ -83,14 +83,19 @@ Plan Uniform::plan(const AmrHierarchy& h, const BuildRequest& request, const Jso
   p.vertices = request.needs.filter == Filter::linear_vertex;
   p.may_border = request.needs.filter == Filter::linear_page;
   p.border = p.may_border && (request.needs.keeps_border() || cells_missing(h, request)) ? 1 : 0;
-  const std::int64_t bytes = p.bytes(request.storage);
-  require_budget(*this, bytes, request);
+  const Vec3i texels = p.texels().size();
+  // a deep mesh has more bytes than 64 bits count, and no texture for them
+  const double about = p.fields * static_cast<double>(texels.x) * texels.y * texels.z * texel_bytes(request.storage);
+  const bool countable = about < 0x1p60;
+  if (countable) require_budget(*this, p.bytes(request.storage), request);
   const int limit = request.context.max_3d_texture_size;
-  if (const Vec3i t = p.texels().size(); std::max({t.x, t.y, t.z}) > limit)
+  if (std::max({texels.x, texels.y, texels.z}) > limit || !countable)
     throw UnsupportedError(
         fmt::format("encoding uniform: level {} has {} x {} x {} cells ({} bytes, {} x {} x {} texels), a 3D texture of this "
                     "context at most {} along an axis",
-                    p.level, p.cells.x, p.cells.y, p.cells.z, bytes, t.x, t.y, t.z, limit));
+                    p.level, p.cells.x, p.cells.y, p.cells.z,
+                    countable ? std::to_string(p.bytes(request.storage)) : fmt::format("about {:.2g}", about), texels.x, texels.y,
+                    texels.z, limit));
   if (p.validity && 4 * p.validity_words() > request.context.max_buffer_bytes)
     throw UnsupportedError(fmt::format("encoding uniform: validity bits take {} bytes, a buffer of this context at most {}",
                                        4 * p.validity_words(), request.context.max_buffer_bytes));

@@ -212,9 +212,14 @@ TEST(Uniform, NamesTheLimitThatItWouldPass) {
   } catch (const BudgetError& e) {
     EXPECT_THAT(e.what(), AllOf(HasSubstr("1048576 bytes"), HasSubstr(std::to_string(4 * 128 * 128 * 128 + 4 * 64))));
   }
-  // 2^31 / 4 bytes a cell would not fit into memory: refused without an allocation
+  // (4 * 2^24)^3 cells of 4 bytes: 2^80, more than 64 bits count
   const AmrHierarchy deep = MeshBuilder(Vec3i(4), std::vector<int>(24, 2)).root(waves).hierarchy();
-  EXPECT_THROW(uniform_field(deep, Filter::nearest), Error);
+  try {
+    uniform_field(deep, Filter::nearest);
+    ADD_FAILURE();
+  } catch (const UnsupportedError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("about 1.2e+24 bytes"));
+  }
 }
 
 }  // namespace
