@@ -300,7 +300,19 @@ constexpr double kLongestInterval = 8;
 double interval_error(double tolerance) { return 1.2 * std::pow(tolerance, 1.25); }
 /// How much the optical depth of a cell may differ from that of the next one for an interval of one cell. A picture's error goes
 /// with the square of the intervals, these with the third root; factor and power are measured (experiments/tolerance).
-double cell_variation(double tolerance) { return 2200 * std::pow(tolerance, 1.7); }
+/// Where extinction rises and falls by several times what it spans, second differences along a ray go with the square of that.
+double cell_variation(double tolerance, const TransferFunction& tf) {
+  double turns = 0;
+  double most = tf.extinction.front().extinction;
+  double least = most;
+  for (std::size_t i = 1; i < tf.extinction.size(); ++i) {
+    turns += std::abs(tf.extinction[i].extinction - tf.extinction[i - 1].extinction);
+    most = std::max(most, tf.extinction[i].extinction);
+    least = std::min(least, tf.extinction[i].extinction);
+  }
+  turns = std::isfinite(turns) && most > least ? turns / (most - least) : 1;
+  return 2000 * std::pow(tolerance, 1.7) / (turns * turns);
+}
 /// Part of the tolerance that a ray may leave behind it.
 constexpr double kToleranceLeft = 0.1;
 
@@ -346,7 +358,7 @@ void add_integrator(const Scene& scene, const EncodedField& field, double unit, 
         "integrator tolerance: the filter nearest jumps from cell to cell, which no interval follows; accepted "
         "are linear_lod, linear_page, linear_vertex, basis");
   b.uniforms.push_back({"u_interval_error", std::vector<double>{interval_error(s.tolerance)}});
-  b.uniforms.push_back({"u_cell_variation", std::vector<double>{cell_variation(s.tolerance)}});
+  b.uniforms.push_back({"u_cell_variation", std::vector<double>{cell_variation(s.tolerance, scene.transfer_function)}});
   b.uniforms.push_back({"u_longest", std::vector<double>{kLongestInterval}});
 }
 
