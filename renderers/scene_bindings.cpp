@@ -311,7 +311,7 @@ double cell_variation(double tolerance, const TransferFunction& tf) {
     least = std::min(least, tf.extinction[i].extinction);
   }
   turns = std::isfinite(turns) && most > least ? turns / (most - least) : 1;
-  return 2000 * std::pow(tolerance, 1.7) / (turns * turns);
+  return 1400 * std::pow(tolerance, 1.7) / (turns * turns);
 }
 /// Part of the tolerance that a ray may leave behind it.
 constexpr double kToleranceLeft = 0.1;
