@@ -8,7 +8,7 @@
 #include <cmath>
 #include <map>
 
-#include "brick_packing.hpp"
+#include "structures/brick_packing.hpp"
 #include "kd_partition.hpp"
 #include "start_grid.hpp"
 #include "structures/build_tools.hpp"

@@ -1,0 +1,384 @@
+// exabricks: regions that know the cells whose hats reach into them. Words: exabricks_layout.h.
+#include "exabricks/exabricks_layout.h"
+#if !AMRTEX_CPP
+#ifndef AMRTEX_EXA_DEPTH
+#error AMRTEX_EXA_DEPTH must be defined: splits from where a descent starts to the deepest leaf, or nodes of the BVH
+#endif
+#ifndef AMRTEX_EXA_GRID
+#error AMRTEX_EXA_GRID must be defined: 1 where descents start from a grid, else 0
+#endif
+#ifndef AMRTEX_EXA_BVH
+#error AMRTEX_EXA_BVH must be defined: 1 where regions are found through a BVH, 0 where through the tree of planes
+#endif
+#ifndef AMRTEX_EXA_CELLS
+#error AMRTEX_EXA_CELLS must be defined: 1 where each sample searches its cells, 0 where its region knows them
+#endif
+#ifndef AMRTEX_EXA_BORDER
+#error AMRTEX_EXA_BORDER must be defined: texels around a brick
+#endif
+#ifndef AMRTEX_EXA_REGION_WORDS
+#error AMRTEX_EXA_REGION_WORDS must be defined: words of a region
+#endif
+#ifndef AMRTEX_EXA_MISSING
+#error AMRTEX_EXA_MISSING must be defined: 1 where bricks hold cells without value, else 0
+#endif
+#ifndef AMRTEX_POOL_X
+#error AMRTEX_POOL_X, _Y and _Z must be defined: texels of the pool along each axis
+#endif
+#endif
+DEFINE_INT(AMRTEX_EXA_DEPTH)
+DEFINE_INT(AMRTEX_EXA_GRID)
+DEFINE_INT(AMRTEX_EXA_BVH)
+DEFINE_INT(AMRTEX_EXA_CELLS)
+DEFINE_INT(AMRTEX_EXA_BORDER)
+DEFINE_INT(AMRTEX_EXA_REGION_WORDS)
+DEFINE_INT(AMRTEX_EXA_MISSING)
+DEFINE_INT(AMRTEX_POOL_X)
+DEFINE_INT(AMRTEX_POOL_Y)
+DEFINE_INT(AMRTEX_POOL_Z)
+
+BUFFER(uint, exa_regions, exa_regions_block)
+BUFFER(uvec4, exa_pieces, exa_pieces_block)
+#if AMRTEX_CPP || AMRTEX_EXA_BVH
+BUFFER(uvec4, exa_bvh, exa_bvh_block)  // two a node: (lower corner, region + 1 or 0 for an inner node), (upper corner, next node beside it)
+#endif
+#if AMRTEX_CPP || !AMRTEX_EXA_BVH
+BUFFER(uvec2, exa_nodes, exa_nodes_block)
+#endif
+#if AMRTEX_CPP || AMRTEX_EXA_GRID
+BUFFER(uint, exa_start, exa_start_block)               // a cell of the grid: where the boxes below tell its node
+BUFFER(uvec4, exa_start_nodes, exa_start_nodes_block)  // two a node: (lower corner, node), (upper corner, unused)
+UNIFORM(ivec3, u_exa_grid)                             // cells of the grid
+UNIFORM(ivec3, u_exa_grid_width)                       // x: width of a cell of the grid, finest cells
+#endif
+#if AMRTEX_CPP || AMRTEX_EXA_CELLS
+BUFFER(uvec4, exa_brick_nodes, exa_brick_nodes_block)  // (axis and first child, plane, widest cell below it, brick + 1 or 0)
+#endif
+#if AMRTEX_CPP || AMRTEX_EXA_MISSING
+BUFFER(uint, exa_validity, exa_validity_block)  // one bit a texel of the pool, each field from a new word
+#endif
+VALUE_TEXTURES(tex_exa_pool, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)
+
+// ---- locating
+
+int exa_axis(IN(uint) word) { return int(word >> uint(AMRTEX_EXA_CHILD_BITS)); }
+int exa_first_child(IN(uint) word) { return int(word & ((1u << uint(AMRTEX_EXA_CHILD_BITS)) - 1u)); }
+int exa_component(IN(ivec3) v, IN(int) axis) { return axis == 0 ? v.x : (axis == 1 ? v.y : v.z); }
+ivec3 exa_corner(IN(uvec4) words) { return ivec3(int(words.x), int(words.y), int(words.z)); }
+
+// Where the descent for a cell starts: a node, whose box r receives.
+int exa_begin(IN(ivec3) cell, INOUT(Region) r) {
+#if AMRTEX_CPP || AMRTEX_EXA_GRID
+  if (AMRTEX_EXA_GRID != 0) {
+    ivec3 g = divide_by_width(cell, u_exa_grid_width.x);
+    int start = int(exa_start[g.x + u_exa_grid.x * (g.y + u_exa_grid.y * g.z)]);
+    uvec4 lower = exa_start_nodes[start * 2];
+    r.lower = exa_corner(lower);
+    r.upper = exa_corner(exa_start_nodes[start * 2 + 1]);
+    return int(lower.w);
+  }
+#endif
+  r.lower = ivec3(0);
+  r.upper = u_domain_cells;
+  return 0;
+}
+
+#if AMRTEX_CPP || !AMRTEX_EXA_BVH
+// The leaf that holds a cell: its region. r.lower and r.upper become its box.
+uint exa_descend(IN(ivec3) cell, INOUT(Region) r) {
+  uvec2 node = exa_nodes[exa_begin(cell, r)];
+  int child = exa_first_child(node.x);
+  int steps = 0;
+  if (child != 0) {
+    do {
+      int axis = exa_axis(node.x);
+      int plane = int(node.y);
+      bool above = exa_component(cell, axis) >= plane;
+      ivec3 along = ivec3(axis == 0 ? 1 : 0, axis == 1 ? 1 : 0, axis == 2 ? 1 : 0);
+      ivec3 others = ivec3(1) - along;
+      if (above) r.lower = r.lower * others + along * plane;
+      else r.upper = r.upper * others + along * plane;
+      node = exa_nodes[child + (above ? 1 : 0)];
+      child = exa_first_child(node.x);
+      steps += 1;
+    } while (child != 0 && steps < AMRTEX_EXA_DEPTH);
+  }
+  return node.y;
+}
+#endif
+
+#if AMRTEX_CPP || AMRTEX_EXA_BVH
+// The same through the BVH, whose nodes stand depth first: what does not hold the cell is passed over. A leaf has the
+// region + 1, and 0xffffffff + 1 = 0 tells an inner node: leaves without mesh have AMRTEX_EXA_NO_REGION itself.
+uint exa_search_bvh(IN(ivec3) cell, INOUT(Region) r) {
+  int i = 0;
+  uint found = 0u;
+  int steps = 0;
+  do {
+    uvec4 lower = exa_bvh[i * 2];
+    uvec4 upper = exa_bvh[i * 2 + 1];
+    r.lower = exa_corner(lower);
+    r.upper = exa_corner(upper);
+    bool holds = all(greaterThanEqual(cell, r.lower)) && all(lessThan(cell, r.upper));
+    if (holds) found = lower.w;
+    i = holds ? i + 1 : int(upper.w);
+    steps += 1;
+  } while (found == 0u && steps < AMRTEX_EXA_DEPTH);
+  return found == AMRTEX_EXA_NO_REGION ? found : found - 1u;
+}
+#endif
+
+uint exa_find_region(IN(ivec3) cell, INOUT(Region) r) {
+#if AMRTEX_CPP
+  return AMRTEX_EXA_BVH != 0 ? exa_search_bvh(cell, r) : exa_descend(cell, r);
+#elif AMRTEX_EXA_BVH
+  return exa_search_bvh(cell, r);
+#else
+  return exa_descend(cell, r);
+#endif
+}
+
+STRUCT ExaPiece {
+  ivec3 lower;  // finest cells
+  int width;    // of a cell, finest cells
+  ivec3 texel;  // of its first cell
+  ivec3 cells;  // along each axis
+};
+
+ivec3 exa_unpack_size(IN(uint) size) {
+  uint most = (1u << uint(AMRTEX_EXA_SIZE_BITS)) - 1u;
+  return ivec3(int(size & most), int((size >> uint(AMRTEX_EXA_SIZE_BITS)) & most), int(size >> uint(2 * AMRTEX_EXA_SIZE_BITS)));
+}
+
+ExaPiece exa_piece(IN(int) index) {
+  uvec4 place = exa_pieces[index * 2];
+  uvec4 store = exa_pieces[index * 2 + 1];
+  ExaPiece p;
+  p.lower = exa_corner(place);
+  p.width = level_width(int(place.w));
+  p.texel = exa_corner(store);
+  p.cells = exa_unpack_size(store.w);
+  return p;
+}
+
+vec3r exa_inverse_pool() {
+  return vec3r(real(1) / real(AMRTEX_POOL_X), real(1) / real(AMRTEX_POOL_Y), real(1) / real(AMRTEX_POOL_Z));
+}
+
+// Handle of a plain region, whose f is trilinear in its own brick's texels: (texel of the brick's first cell, -1 - packed cells).
+// Of any other: (first piece, has it cells without value?, brick, pieces).
+bool locate(IN(Position) p, OUT(Region) r) {
+  uint region = exa_find_region(p.cell, r);
+  r.level = AMRTEX_LEVELS - 1;
+  r.width = 1;
+  r.value_range = vec2r(0);
+  r.handle = ivec4(0);
+  r.texture_lower = vec3r(0);
+  r.texture_scale = vec3r(0);
+  if (region == AMRTEX_EXA_NO_REGION) return false;
+  int at = int(region) * AMRTEX_EXA_REGION_WORDS;
+  int brick = int(exa_regions[at]);
+  uint about = exa_regions[at + 2];
+  r.level = int((about >> uint(AMRTEX_EXA_PIECE_BITS)) & uint((1 << AMRTEX_EXA_LEVEL_BITS) - 1));
+  r.width = level_width(r.level);
+  if (AMRTEX_VALUE_RANGES != 0) r.value_range = decode_range(exa_regions[at + 3]);
+  ExaPiece own = exa_piece(brick);
+  bool plain = (about & AMRTEX_EXA_PLAIN_FLAG) != 0u;
+  if (plain) {
+    r.handle = ivec4(own.texel.x, own.texel.y, own.texel.z, -1 - int(exa_pieces[brick * 2 + 1].w));
+    real inverse_width = real(1) / real(own.width);
+    r.texture_lower = vec3r(r.lower - own.lower) * inverse_width;
+    r.texture_scale = vec3r(real(r.width) * inverse_width);
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+    r.texture_lower = (vec3r(own.texel) + r.texture_lower) * exa_inverse_pool();
+    r.texture_scale *= exa_inverse_pool();
+#endif
+  } else {
+    bool missing = (about & AMRTEX_EXA_MISSING_FLAG) != 0u;
+    int pieces = int(about & ((1u << uint(AMRTEX_EXA_PIECE_BITS)) - 1u));
+    r.handle = ivec4(int(exa_regions[at + 1]), missing ? 1 : 0, brick, pieces);
+  }
+  return true;
+}
+
+// ---- values
+
+real exa_texel(IN(int) field, IN(ivec3) texel) { return texelFetch(tex_exa_pool[field], texel, 0).x; }
+
+#if AMRTEX_CPP || AMRTEX_EXA_MISSING
+bool exa_has_value(IN(int) field, IN(ivec3) texel) {
+  int words = (AMRTEX_POOL_X * AMRTEX_POOL_Y * AMRTEX_POOL_Z + 31) >> 5;
+  int bit = texel.x + AMRTEX_POOL_X * (texel.y + AMRTEX_POOL_Y * texel.z);
+  return ((exa_validity[field * words + (bit >> 5)] >> uint(bit & 31)) & 1u) != 0u;
+}
+#endif
+
+// Between the centres of the texels i and j.
+real exa_between(IN(int) field, IN(ivec3) i, IN(ivec3) j, IN(vec3r) f) {
+  return decode_value(trilinear(exa_texel(field, i), exa_texel(field, ivec3(j.x, i.y, i.z)), exa_texel(field, ivec3(i.x, j.y, i.z)),
+                                exa_texel(field, ivec3(j.x, j.y, i.z)), exa_texel(field, ivec3(i.x, i.y, j.z)),
+                                exa_texel(field, ivec3(j.x, i.y, j.z)), exa_texel(field, ivec3(i.x, j.y, j.z)), exa_texel(field, j), f),
+                      field);
+}
+
+// All hats that reach the region are those of its brick's texels, and add up to 1.
+real exa_plain_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+  return decode_value(textureLod(tex_exa_pool[field], r.texture_lower + q * r.texture_scale, 0.0).x, field);
+#else
+  ivec3 last = exa_unpack_size(uint(-1 - r.handle.w)) - ivec3(2 - AMRTEX_EXA_BORDER);
+  PRECISE vec3r scaled = q * r.texture_scale;
+  PRECISE vec3r x = scaled + r.texture_lower;
+  PRECISE vec3r from_centre = x - vec3r(0.5);
+  vec3r whole = clamp(floor(from_centre), vec3r(-AMRTEX_EXA_BORDER), vec3r(last));
+  PRECISE vec3r f = from_centre - whole;
+  ivec3 i = ivec3(r.handle.x, r.handle.y, r.handle.z) + ivec3(whole);
+  return exa_between(field, i, i + ivec3(1), f);
+#endif
+}
+
+// Trilinear between the centres of a piece's cells, constant beyond the outer ones; x in cell widths from its corner.
+real exa_clamped_value(IN(ExaPiece) p, IN(int) field, IN(vec3r) x) {
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+  // Past the centre the texture unit would read of another piece's texel: the rounding of its coordinate is kept off.
+  vec3r off = min(vec3r(p.cells - ivec3(1)), vec3r(1)) * (1.1920929e-7 * float(max(AMRTEX_POOL_X, max(AMRTEX_POOL_Y, AMRTEX_POOL_Z))));
+  vec3r inside = clamp(x, vec3r(0.5) + off, vec3r(p.cells) - vec3r(0.5) - off);
+  return decode_value(textureLod(tex_exa_pool[field], (vec3r(p.texel) + inside) * exa_inverse_pool(), 0.0).x, field);
+#else
+  PRECISE vec3r from_centre = clamp(x - vec3r(0.5), vec3r(0), vec3r(p.cells - ivec3(1)));
+  ivec3 i = ivec3(floor(from_centre));
+  PRECISE vec3r f = from_centre - vec3r(i);
+  return exa_between(field, p.texel + i, p.texel + min(i + ivec3(1), p.cells - ivec3(1)), f);
+#endif
+}
+
+// The sum of a piece's hats at x: it grows from 0, half a cell before the piece, to 1 at the first centres.
+real exa_hat_sum(IN(ExaPiece) p, IN(vec3r) x) {
+  PRECISE vec3r below = x + vec3r(0.5);
+  PRECISE vec3r above = vec3r(p.cells) + vec3r(0.5) - x;
+  vec3r w = clamp(min(below, above), vec3r(0), vec3r(1));
+  PRECISE real product = w.x * w.y * w.z;
+  return product;
+}
+
+#if AMRTEX_CPP || AMRTEX_EXA_MISSING
+// Adds the piece's hats one by one; those of cells without value are left out.
+void exa_add_present(IN(ExaPiece) p, IN(int) field, IN(vec3r) x, INOUT(vec2r) sums) {
+  PRECISE vec3r from_centre = x - vec3r(0.5);
+  vec3r whole = floor(from_centre);
+  PRECISE vec3r f = from_centre - whole;
+  ivec3 first = ivec3(whole);
+  int k = 0;
+  do {
+    ivec3 corner = ivec3(k & 1, (k >> 1) & 1, k >> 2);
+    ivec3 c = first + corner;
+    bool there = all(greaterThanEqual(c, ivec3(0))) && all(lessThan(c, p.cells));
+    if (there && exa_has_value(field, p.texel + c)) {
+      PRECISE vec3r w = vec3r(corner) * f + vec3r(ivec3(1) - corner) * (vec3r(1) - f);
+      PRECISE real hat = w.x * w.y * w.z;
+      PRECISE real part = hat * decode_value(exa_texel(field, p.texel + c), field);
+      sums.x += part;
+      sums.y += hat;
+    }
+    k += 1;
+  } while (k < 8);
+}
+
+// Has the leaf cell that holds q, of the region's own brick, a value?
+bool exa_own_cell_has_value(IN(Region) r, IN(int) field, IN(int) brick, IN(vec3r) q) {
+  ExaPiece own = exa_piece(brick);
+  ivec3 cell = r.lower - own.lower + ivec3(floor(q)) * r.width;
+  return exa_has_value(field, own.texel + clamp(divide_by_width(cell, own.width), ivec3(0), own.cells - ivec3(1)));
+}
+#endif
+
+// Adds a piece's hats times their values, and the hats.
+void exa_add_piece(IN(Region) r, IN(ExaPiece) p, IN(int) field, IN(vec3r) q, INOUT(vec2r) sums) {
+  PRECISE vec3r finest = q * real(r.width) + vec3r(r.lower - p.lower);
+  PRECISE vec3r x = finest * (real(1) / real(p.width));
+#if AMRTEX_CPP || AMRTEX_EXA_MISSING
+  if (AMRTEX_EXA_MISSING != 0 && r.handle.y != 0) {
+    exa_add_present(p, field, x, sums);
+    return;
+  }
+#endif
+  real hats = exa_hat_sum(p, x);
+  PRECISE real part = hats * exa_clamped_value(p, field, x);
+  sums.x += part;
+  sums.y += hats;
+}
+
+#if AMRTEX_CPP || AMRTEX_EXA_CELLS
+// The hats about q after a search from the root, as each sample of Wald et al. 2017 makes it: into both sides of a plane
+// that lies within half of the widest cell there.
+vec2r exa_search_cells(IN(Region) r, IN(int) field, IN(vec3r) q) {
+  vec2r sums = vec2r(0);
+  int stack[AMRTEX_EXA_STACK];
+  int top = 1;
+  stack[0] = 0;
+  do {
+    top -= 1;
+    uvec4 node = exa_brick_nodes[stack[top]];
+    int child = exa_first_child(node.x);
+    if (child != 0) {
+      int axis = exa_axis(node.x);
+      real from_plane = q[axis] * real(r.width) + real(exa_component(r.lower, axis) - int(node.y));
+      // of the two children: how far the hats of their cells reach past the plane
+      if (from_plane > real(-0.5) * real(int(exa_brick_nodes[child + 1].z))) {
+        stack[top] = child + 1;
+        top += 1;
+      }
+      if (from_plane < real(0.5) * real(int(exa_brick_nodes[child].z))) {
+        stack[top] = child;
+        top += 1;
+      }
+    } else if (node.w != 0u) {
+      exa_add_piece(r, exa_piece(int(node.w) - 1), field, q, sums);
+    }
+  } while (top > 0);
+  return sums;
+}
+#endif
+
+vec2r exa_sums(IN(Region) r, IN(int) field, IN(vec3r) q) {
+#if AMRTEX_CPP || AMRTEX_EXA_CELLS
+  if (AMRTEX_EXA_CELLS != 0) return exa_search_cells(r, field, q);
+#endif
+  vec2r sums = vec2r(0);
+  int i = r.handle.x;
+  int end = i + r.handle.w;
+  do {
+    exa_add_piece(r, exa_piece(i), field, q, sums);
+    i += 1;
+  } while (i < end);
+  return sums;
+}
+
+real exa_nearest_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
+  ivec3 cells = exa_unpack_size(uint(-1 - r.handle.w));
+  ivec3 texel = ivec3(r.handle.x, r.handle.y, r.handle.z) + clamp(ivec3(floor(q)), ivec3(0), cells - ivec3(1));
+#if AMRTEX_CPP || AMRTEX_EXA_MISSING
+  if (AMRTEX_EXA_MISSING != 0 && !exa_has_value(field, texel)) return no_value();
+#endif
+  return decode_value(exa_texel(field, texel), field);
+}
+
+real fetch_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
+  if (AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) return exa_nearest_value(r, field, q);
+  real value = real(0);
+  if (r.handle.w < 0) {
+    value = exa_plain_value(r, field, q);
+  } else {
+    bool found = true;
+#if AMRTEX_CPP || AMRTEX_EXA_MISSING
+    if (AMRTEX_EXA_MISSING != 0 && r.handle.y != 0) found = exa_own_cell_has_value(r, field, r.handle.z, q);
+    value = no_value();
+#endif
+    if (found) {
+      vec2r sums = exa_sums(r, field, q);
+      PRECISE real quotient = sums.x * (real(1) / sums.y);
+      value = quotient;
+    }
+  }
+  return value;
+}
