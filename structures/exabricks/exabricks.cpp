@@ -5,6 +5,7 @@
 
 #include <array>
 #include <atomic>
+#include <bit>
 #include <cmath>
 
 #include "bricks.hpp"
@@ -27,6 +28,7 @@ constexpr int kNarrowestBrick = 2;
 constexpr int kWidestBrick = 256;
 /// A start grid takes at most this part of what the other bytes of one field are.
 constexpr std::int64_t kGridShare = 16;
+constexpr int kMiddleOffset = 1 << (AMRTEX_EXA_OFFSET_BITS - 1);
 
 enum class Traversal { grid, kd, bvh };
 
@@ -45,16 +47,25 @@ struct Plan {
   kd::StartGrid grid;
   std::vector<BvhNode> bvh;
   std::vector<std::int64_t> leaf_region;  ///< of an item of the BVH; -1: no mesh
-  std::vector<std::int64_t> first_piece;  ///< of a region among those that are stored, after the bricks
-  std::int64_t stored_pieces = 0;         ///< without the bricks
+  std::vector<std::int64_t> first_piece;  ///< of a region, among those that are stored
+  std::int64_t stored_pieces = 0;
   int region_words = 3;
   bool missing = false;  ///< do bricks hold cells without value?
+  Vec3i texel_bits{0};   ///< of a packed texel
   std::int64_t validity_words = 0;
   std::int64_t brick_texels = 0;
   std::int64_t brick_cells = 0;
+  /// A plain region needs none, but may turn out to have cells without value.
+  bool keeps_pieces(const Options& o, const Region& r) const { return o.hats && !o.cells && (!r.plain || missing); }
   std::int64_t regions() const { return static_cast<std::int64_t>(set.regions.size()); }
   std::int64_t bricks() const { return static_cast<std::int64_t>(tree.bricks.size()); }
 };
+
+/// Where the region's lower corner lies from the piece's, in cell widths of the region.
+Vec3i corner_offset(const AmrHierarchy& h, const Plan& p, const Region& r, const Piece& piece) {
+  const Brick& b = p.tree.bricks[static_cast<std::size_t>(piece.brick)];
+  return (r.box.lower - piece.cells.lower * b.width) / h.cell_width(r.level);
+}
 
 /// Past the last texel of a piece the rounding of the normalised coordinate (3 times 2^-24 of the pool an axis) lets the
 /// texture unit see a little of the next texel.
@@ -181,6 +192,7 @@ class Exabricks final : public Encoding {
   Plan plan(const AmrHierarchy& h, const BuildRequest& request, const Options& o) const;
   void plan_pool(const BuildRequest& request, const Options& o, Plan& p) const;
   void plan_traversal(const AmrHierarchy& h, const BuildRequest& request, const Options& o, Plan& p) const;
+  void require_offsets(const AmrHierarchy& h, const Plan& p, const Region& r) const;
   void require_sizes(const BuildRequest& request, const Options& o, const Plan& p) const;
 };
 
@@ -224,6 +236,10 @@ void Exabricks::plan_pool(const BuildRequest& request, const Options& o, Plan& p
     throw UnsupportedError(
         fmt::format("encoding exabricks: {} bricks of up to {} x {} x {} texels do not fit a 3D texture of {} texels an axis",
                     sizes.size(), largest.x, largest.y, largest.z, limit));
+  for (int a = 0; a < 3; ++a) p.texel_bits[a] = std::bit_width(static_cast<unsigned>(p.packing.size[a] - 1));
+  if (const int bits = p.texel_bits.x + p.texel_bits.y + p.texel_bits.z; bits > 32)
+    throw UnsupportedError(fmt::format("encoding exabricks: texels of a pool of {} x {} x {} take {} bits, a brick tells 32",
+                                       p.packing.size.x, p.packing.size.y, p.packing.size.z, bits));
   if (p.missing) p.validity_words = words_for_bits(p.packing.texels());
 }
 
@@ -273,9 +289,10 @@ void Exabricks::plan_traversal(const AmrHierarchy& h, const BuildRequest& reques
 /// Exact bytes against the limits of the context and of the user, before anything is allocated.
 void Exabricks::require_sizes(const BuildRequest& request, const Options& o, const Plan& p) const {
   const auto nodes = static_cast<std::int64_t>(p.set.nodes.size());
-  const std::array<std::pair<const char*, std::int64_t>, 8> buffers{
+  const std::array<std::pair<const char*, std::int64_t>, 9> buffers{
       {{"regions", 4 * std::max<std::int64_t>(p.region_words * p.regions(), 1)},
-       {"bricks and pieces", 32 * std::max<std::int64_t>(p.bricks() + p.stored_pieces, 1)},
+       {"bricks", 32 * std::max<std::int64_t>(p.bricks(), 1)},
+       {"pieces", o.hats && !o.cells ? 16 * std::max<std::int64_t>(p.stored_pieces, 1) : 0},
        {"nodes over the regions", o.traversal == Traversal::bvh ? 0 : 8 * nodes},
        {"the BVH over the regions", 32 * static_cast<std::int64_t>(p.bvh.size())},
        {"the start grid", 4 * static_cast<std::int64_t>(p.grid.entries.size())},
@@ -300,6 +317,19 @@ void Exabricks::require_sizes(const BuildRequest& request, const Options& o, con
   }
 }
 
+/// A piece tells where its region lies in 16 bits an axis, enough but for jumps over very many levels.
+void Exabricks::require_offsets(const AmrHierarchy& h, const Plan& p, const Region& r) const {
+  for (int k = 0; k < r.pieces; ++k) {
+    const Vec3i offset = corner_offset(h, p, r, p.set.pieces[static_cast<std::size_t>(r.first_piece + k)]);
+    for (int a = 0; a < 3; ++a)
+      if (std::abs(offset[a]) >= kMiddleOffset)
+        throw UnsupportedError(
+            fmt::format("encoding exabricks: a region lies {} of its cells from cells that reach into it, a piece tells "
+                        "less than {}; levels that meet differ by too much",
+                        std::abs(offset[a]), kMiddleOffset));
+  }
+}
+
 Plan Exabricks::plan(const AmrHierarchy& h, const BuildRequest& request, const Options& o) const {
   if (h.level_count() > (1 << AMRTEX_EXA_LEVEL_BITS))
     throw UnsupportedError(
@@ -317,9 +347,10 @@ Plan Exabricks::plan(const AmrHierarchy& h, const BuildRequest& request, const O
   for (int number = 0; number < request.field_count(); ++number)
     p.missing = p.missing || h.statistics(request.field_at(number)).cells_without_value > 0;
   for (const Region& r : p.set.regions) {
-    p.first_piece.push_back(p.bricks() + p.stored_pieces);
-    // a plain region may turn out to have cells without value
-    if (o.hats && !o.cells && (!r.plain || p.missing)) p.stored_pieces += r.pieces;
+    p.first_piece.push_back(p.stored_pieces);
+    if (!p.keeps_pieces(o, r)) continue;
+    p.stored_pieces += r.pieces;
+    require_offsets(h, p, r);
   }
   p.region_words = request.needs.value_ranges ? 4 : 3;
   plan_pool(request, o, p);
@@ -367,8 +398,9 @@ HostTexture make_regions(const AmrHierarchy& h, const BuildRequest& request, con
     auto* words = regions.as<std::uint32_t>() + i * static_cast<std::size_t>(p.region_words);
     words[0] = static_cast<std::uint32_t>(r.brick);
     words[1] = static_cast<std::uint32_t>(p.first_piece[i]);
-    words[2] = static_cast<std::uint32_t>(r.pieces) | static_cast<std::uint32_t>(r.level) << AMRTEX_EXA_PIECE_BITS |
-               (plain ? AMRTEX_EXA_PLAIN_FLAG : 0U) | (facts.missing ? AMRTEX_EXA_MISSING_FLAG : 0U);
+    words[2] = static_cast<std::uint32_t>(r.pieces) | static_cast<std::uint32_t>(r.level) << (AMRTEX_EXA_PIECE_BITS + 1) |
+               (plain ? AMRTEX_EXA_PLAIN_FLAG : 0U) | (facts.missing ? AMRTEX_EXA_MISSING_FLAG : 0U) |
+               (r.own && !facts.missing ? AMRTEX_EXA_OWN_FLAG : 0U);
     if (p.region_words < 4) return;
     words[3] = facts.range.empty() ? kVacantRange
                                    : encode_range({facts.range.min - leak, facts.range.max + leak}, field.range_origin,
@@ -377,33 +409,43 @@ HostTexture make_regions(const AmrHierarchy& h, const BuildRequest& request, con
   return regions;
 }
 
-/// A box of cells of a brick, eight words.
-void write_piece(const Plan& p, int border, const Piece& piece, std::uint32_t* words) {
-  const auto brick = static_cast<std::size_t>(piece.brick);
-  const Brick& b = p.tree.bricks[brick];
-  const Vec3i lower = piece.cells.lower * b.width;
-  const Vec3i texel = p.packing.at[brick] + Vec3i(border) + piece.cells.lower - b.cells.lower;
-  const Vec3i size = piece.cells.size();
-  for (int a = 0; a < 3; ++a) {
-    words[a] = static_cast<std::uint32_t>(lower[a]);
-    words[4 + a] = static_cast<std::uint32_t>(texel[a]);
-  }
-  words[3] = static_cast<std::uint32_t>(b.level);
-  words[7] = static_cast<std::uint32_t>(size.x) | static_cast<std::uint32_t>(size.y) << AMRTEX_EXA_SIZE_BITS |
-             static_cast<std::uint32_t>(size.z) << (2 * AMRTEX_EXA_SIZE_BITS);
+std::uint32_t packed_texel(const Plan& p, const Vec3i& texel) {
+  return static_cast<std::uint32_t>(texel.x) | static_cast<std::uint32_t>(texel.y) << p.texel_bits.x |
+         static_cast<std::uint32_t>(texel.z) << (p.texel_bits.x + p.texel_bits.y);
 }
 
-HostTexture make_pieces(const Options& o, const Plan& p) {
-  HostTexture pieces = make_buffer("exa_pieces", TexelFormat::rgba32ui, 2 * (p.bricks() + p.stored_pieces));
-  auto* words = pieces.as<std::uint32_t>();
-  for (std::size_t i = 0; i < p.tree.bricks.size(); ++i, words += 8)
-    write_piece(p, o.border, {static_cast<int>(i), p.tree.bricks[i].cells}, words);
-  for (std::size_t i = 0; i < p.set.regions.size(); ++i) {
-    const Region& r = p.set.regions[i];
-    const std::int64_t next = i + 1 < p.first_piece.size() ? p.first_piece[i + 1] : p.bricks() + p.stored_pieces;
-    for (int k = 0; k < static_cast<int>(next - p.first_piece[i]); ++k, words += 8)
-      write_piece(p, o.border, p.set.pieces[static_cast<std::size_t>(r.first_piece + k)], words);
+std::uint32_t packed_size(const Vec3i& size) {
+  return static_cast<std::uint32_t>(size.x) | static_cast<std::uint32_t>(size.y) << AMRTEX_EXA_SIZE_BITS |
+         static_cast<std::uint32_t>(size.z) << (2 * AMRTEX_EXA_SIZE_BITS);
+}
+
+HostTexture make_bricks(const Options& o, const Plan& p) {
+  HostTexture bricks = make_buffer("exa_bricks", TexelFormat::rgba32ui, 2 * p.bricks());
+  auto* words = bricks.as<std::uint32_t>();
+  for (std::size_t i = 0; i < p.tree.bricks.size(); ++i, words += 8) {
+    const Brick& b = p.tree.bricks[i];
+    for (int a = 0; a < 3; ++a) words[a] = static_cast<std::uint32_t>(b.box().lower[a]);
+    words[3] = static_cast<std::uint32_t>(b.level);
+    words[6] = packed_texel(p, p.packing.at[i] + Vec3i(o.border));
+    words[7] = packed_size(b.cells.size());
   }
+  return bricks;
+}
+
+HostTexture make_pieces(const AmrHierarchy& h, const Options& o, const Plan& p) {
+  HostTexture pieces = make_buffer("exa_pieces", TexelFormat::rgba32ui, p.stored_pieces);
+  auto* words = pieces.as<std::uint32_t>();
+  for (const Region& r : p.set.regions)
+    for (int k = 0; p.keeps_pieces(o, r) && k < r.pieces; ++k, words += 4) {
+      const Piece& piece = p.set.pieces[static_cast<std::size_t>(r.first_piece + k)];
+      const auto brick = static_cast<std::size_t>(piece.brick);
+      const Brick& b = p.tree.bricks[brick];
+      words[0] = packed_texel(p, p.packing.at[brick] + Vec3i(o.border) + piece.cells.lower - b.cells.lower);
+      words[1] = packed_size(piece.cells.size());
+      const Vec3i offset = corner_offset(h, p, r, piece) + Vec3i(kMiddleOffset);
+      words[2] = static_cast<std::uint32_t>(offset.x) | static_cast<std::uint32_t>(offset.y) << AMRTEX_EXA_OFFSET_BITS;
+      words[3] = static_cast<std::uint32_t>(offset.z) | static_cast<std::uint32_t>(b.level) << AMRTEX_EXA_OFFSET_BITS;
+    }
   return pieces;
 }
 
@@ -480,6 +522,8 @@ void add_defines(const Options& o, const Plan& p, EncodedField& field) {
   defines.emplace_back("AMRTEX_EXA_BORDER", o.border);
   defines.emplace_back("AMRTEX_EXA_REGION_WORDS", p.region_words);
   defines.emplace_back("AMRTEX_EXA_MISSING", p.missing ? 1 : 0);
+  defines.emplace_back("AMRTEX_EXA_X_BITS", p.texel_bits.x);
+  defines.emplace_back("AMRTEX_EXA_Y_BITS", p.texel_bits.y);
   defines.emplace_back("AMRTEX_POOL_X", p.packing.size.x);
   defines.emplace_back("AMRTEX_POOL_Y", p.packing.size.y);
   defines.emplace_back("AMRTEX_POOL_Z", p.packing.size.z);
@@ -516,7 +560,7 @@ Json statistics(const Options& o, const Plan& p) {
   json["most_pieces"] = most;
   json["plain_regions"] = plain;
   json["plain_volume"] = plain_volume / all;
-  json["region_bytes"] = 4 * p.region_words * p.regions() + 32 * p.stored_pieces +
+  json["region_bytes"] = 4 * p.region_words * p.regions() + 16 * p.stored_pieces +
                          (o.traversal == Traversal::bvh ? 32 * static_cast<std::int64_t>(p.bvh.size())
                                                         : 8 * static_cast<std::int64_t>(p.set.nodes.size()) + p.grid.bytes());
   json["brick_bytes"] = 32 * p.bricks();
@@ -543,7 +587,7 @@ std::vector<LeftOut> left_out(const BuildRequest& request, const Options& o, con
   if (o.hats && !o.cells && !p.missing) {
     std::int64_t pieces = 0;
     for (const Region& r : p.set.regions) pieces += r.plain ? r.pieces : 0;
-    list.push_back({"pieces of plain regions", "their brick's texels give the filter as they stand", 32 * pieces});
+    list.push_back({"pieces of plain regions", "their brick's texels give the filter as they stand", 16 * pieces});
   }
   return list;
 }
@@ -561,7 +605,8 @@ EncodedField Exabricks::build(const AmrHierarchy& h, const BuildRequest& request
   add_defines(o, p, field);
   field.left_out = left_out(request, o, p);
   field.textures.push_back(make_regions(h, request, o, p, field, stores));
-  field.textures.push_back(make_pieces(o, p));
+  field.textures.push_back(make_bricks(o, p));
+  if (o.hats && !o.cells) field.textures.push_back(make_pieces(h, o, p));
   if (o.traversal == Traversal::bvh)
     field.textures.push_back(make_bvh(p));
   else

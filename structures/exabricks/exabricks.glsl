@@ -22,6 +22,9 @@
 #ifndef AMRTEX_EXA_MISSING
 #error AMRTEX_EXA_MISSING must be defined: 1 where bricks hold cells without value, else 0
 #endif
+#ifndef AMRTEX_EXA_X_BITS
+#error AMRTEX_EXA_X_BITS and AMRTEX_EXA_Y_BITS must be defined: bits of x and y in a packed texel
+#endif
 #ifndef AMRTEX_POOL_X
 #error AMRTEX_POOL_X, _Y and _Z must be defined: texels of the pool along each axis
 #endif
@@ -33,12 +36,17 @@ DEFINE_INT(AMRTEX_EXA_CELLS)
 DEFINE_INT(AMRTEX_EXA_BORDER)
 DEFINE_INT(AMRTEX_EXA_REGION_WORDS)
 DEFINE_INT(AMRTEX_EXA_MISSING)
+DEFINE_INT(AMRTEX_EXA_X_BITS)
+DEFINE_INT(AMRTEX_EXA_Y_BITS)
 DEFINE_INT(AMRTEX_POOL_X)
 DEFINE_INT(AMRTEX_POOL_Y)
 DEFINE_INT(AMRTEX_POOL_Z)
 
 BUFFER(uint, exa_regions, exa_regions_block)
+BUFFER(uvec4, exa_bricks, exa_bricks_block)
+#if AMRTEX_CPP || (AMRTEX_FILTER == AMRTEX_FILTER_BASIS && !AMRTEX_EXA_CELLS)
 BUFFER(uvec4, exa_pieces, exa_pieces_block)
+#endif
 #if AMRTEX_CPP || AMRTEX_EXA_BVH
 BUFFER(uvec4, exa_bvh, exa_bvh_block)  // two a node: (lower corner, region + 1 or 0 for an inner node), (upper corner, next node beside it)
 #endif
@@ -138,35 +146,23 @@ uint exa_find_region(IN(ivec3) cell, INOUT(Region) r) {
 #endif
 }
 
-STRUCT ExaPiece {
-  ivec3 lower;  // finest cells
-  int width;    // of a cell, finest cells
-  ivec3 texel;  // of its first cell
-  ivec3 cells;  // along each axis
-};
-
 ivec3 exa_unpack_size(IN(uint) size) {
   uint most = (1u << uint(AMRTEX_EXA_SIZE_BITS)) - 1u;
   return ivec3(int(size & most), int((size >> uint(AMRTEX_EXA_SIZE_BITS)) & most), int(size >> uint(2 * AMRTEX_EXA_SIZE_BITS)));
 }
 
-ExaPiece exa_piece(IN(int) index) {
-  uvec4 place = exa_pieces[index * 2];
-  uvec4 store = exa_pieces[index * 2 + 1];
-  ExaPiece p;
-  p.lower = exa_corner(place);
-  p.width = level_width(int(place.w));
-  p.texel = exa_corner(store);
-  p.cells = exa_unpack_size(store.w);
-  return p;
+ivec3 exa_unpack_texel(IN(uint) texel) {
+  return ivec3(int(texel & ((1u << uint(AMRTEX_EXA_X_BITS)) - 1u)),
+               int((texel >> uint(AMRTEX_EXA_X_BITS)) & ((1u << uint(AMRTEX_EXA_Y_BITS)) - 1u)),
+               int(texel >> uint(AMRTEX_EXA_X_BITS + AMRTEX_EXA_Y_BITS)));
 }
 
 vec3r exa_inverse_pool() {
   return vec3r(real(1) / real(AMRTEX_POOL_X), real(1) / real(AMRTEX_POOL_Y), real(1) / real(AMRTEX_POOL_Z));
 }
 
-// Handle of a plain region, whose f is trilinear in its own brick's texels: (texel of the brick's first cell, -1 - packed cells).
-// Of any other: (first piece, has it cells without value?, brick, pieces).
+// Handle: (texel of the brick's first cell, its cells along the axes, first piece or the brick, pieces and flags or 0 in a plain region).
+// texture_lower and texture_scale turn q into cell widths from the brick's corner, or into its texture coordinate.
 bool locate(IN(Position) p, OUT(Region) r) {
   uint region = exa_find_region(p.cell, r);
   r.level = AMRTEX_LEVELS - 1;
@@ -179,27 +175,62 @@ bool locate(IN(Position) p, OUT(Region) r) {
   int at = int(region) * AMRTEX_EXA_REGION_WORDS;
   int brick = int(exa_regions[at]);
   uint about = exa_regions[at + 2];
-  r.level = int((about >> uint(AMRTEX_EXA_PIECE_BITS)) & uint((1 << AMRTEX_EXA_LEVEL_BITS) - 1));
+  uvec4 place = exa_bricks[brick * 2];
+  uvec4 store = exa_bricks[brick * 2 + 1];
+  r.level = int((about >> uint(AMRTEX_EXA_PIECE_BITS + 1)) & uint((1 << AMRTEX_EXA_LEVEL_BITS) - 1));
   r.width = level_width(r.level);
   if (AMRTEX_VALUE_RANGES != 0) r.value_range = decode_range(exa_regions[at + 3]);
-  ExaPiece own = exa_piece(brick);
-  bool plain = (about & AMRTEX_EXA_PLAIN_FLAG) != 0u;
-  if (plain) {
-    r.handle = ivec4(own.texel.x, own.texel.y, own.texel.z, -1 - int(exa_pieces[brick * 2 + 1].w));
-    real inverse_width = real(1) / real(own.width);
-    r.texture_lower = vec3r(r.lower - own.lower) * inverse_width;
-    r.texture_scale = vec3r(real(r.width) * inverse_width);
+  r.handle.x = int(store.z);
+  r.handle.y = int(store.w);
+  r.handle.z = AMRTEX_EXA_CELLS != 0 ? brick : int(exa_regions[at + 1]);
+  uint flags = AMRTEX_EXA_OWN_FLAG | AMRTEX_EXA_MISSING_FLAG | ((1u << uint(AMRTEX_EXA_PIECE_BITS)) - 1u);
+  r.handle.w = (about & AMRTEX_EXA_PLAIN_FLAG) != 0u ? 0 : int(about & flags);
+  real inverse_width = real(1) / real(level_width(int(place.w)));
+  r.texture_lower = vec3r(r.lower - exa_corner(place)) * inverse_width;
+  r.texture_scale = vec3r(real(r.width) * inverse_width);
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
-    r.texture_lower = (vec3r(own.texel) + r.texture_lower) * exa_inverse_pool();
-    r.texture_scale *= exa_inverse_pool();
+  r.texture_lower = (vec3r(exa_unpack_texel(store.z)) + r.texture_lower) * exa_inverse_pool();
+  r.texture_scale *= exa_inverse_pool();
 #endif
-  } else {
-    bool missing = (about & AMRTEX_EXA_MISSING_FLAG) != 0u;
-    int pieces = int(about & ((1u << uint(AMRTEX_EXA_PIECE_BITS)) - 1u));
-    r.handle = ivec4(int(exa_regions[at + 1]), missing ? 1 : 0, brick, pieces);
-  }
   return true;
 }
+
+bool exa_flag(IN(Region) r, IN(uint) flag) { return (uint(r.handle.w) & flag) != 0u; }
+
+// A box of cells of one level.
+STRUCT ExaPiece {
+  vec3r from_corner;  // of the region's lower corner from the piece's, in cell widths of the region
+  real scale;         // cell width of the region over that of the piece
+  ivec3 texel;        // of its first cell
+  ivec3 cells;        // along each axis
+};
+
+#if AMRTEX_CPP || (AMRTEX_FILTER == AMRTEX_FILTER_BASIS && !AMRTEX_EXA_CELLS)
+ExaPiece exa_piece(IN(Region) r, IN(int) index) {
+  uvec4 words = exa_pieces[index];
+  uint most = (1u << uint(AMRTEX_EXA_OFFSET_BITS)) - 1u;
+  ivec3 offset = ivec3(int(words.z & most), int(words.z >> uint(AMRTEX_EXA_OFFSET_BITS)), int(words.w & most));
+  ExaPiece p;
+  p.from_corner = vec3r(offset - ivec3(1 << (AMRTEX_EXA_OFFSET_BITS - 1)));
+  p.scale = real(r.width) * (real(1) / real(level_width(int(words.w >> uint(AMRTEX_EXA_OFFSET_BITS)))));
+  p.texel = exa_unpack_texel(words.x);
+  p.cells = exa_unpack_size(words.y);
+  return p;
+}
+#endif
+
+#if AMRTEX_CPP || AMRTEX_EXA_CELLS
+ExaPiece exa_brick(IN(Region) r, IN(int) brick) {
+  uvec4 place = exa_bricks[brick * 2];
+  uvec4 store = exa_bricks[brick * 2 + 1];
+  ExaPiece p;
+  p.from_corner = vec3r(r.lower - exa_corner(place)) * (real(1) / real(r.width));
+  p.scale = real(r.width) * (real(1) / real(level_width(int(place.w))));
+  p.texel = exa_unpack_texel(store.z);
+  p.cells = exa_unpack_size(store.w);
+  return p;
+}
+#endif
 
 // ---- values
 
@@ -221,18 +252,18 @@ real exa_between(IN(int) field, IN(ivec3) i, IN(ivec3) j, IN(vec3r) f) {
                       field);
 }
 
-// All hats that reach the region are those of its brick's texels, and add up to 1.
+// Trilinear in the texels of the region's own brick. Where all hats that reach the region are those of them, that is f.
 real exa_plain_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
   return decode_value(textureLod(tex_exa_pool[field], r.texture_lower + q * r.texture_scale, 0.0).x, field);
 #else
-  ivec3 last = exa_unpack_size(uint(-1 - r.handle.w)) - ivec3(2 - AMRTEX_EXA_BORDER);
+  ivec3 last = exa_unpack_size(uint(r.handle.y)) - ivec3(2 - AMRTEX_EXA_BORDER);
   PRECISE vec3r scaled = q * r.texture_scale;
   PRECISE vec3r x = scaled + r.texture_lower;
   PRECISE vec3r from_centre = x - vec3r(0.5);
   vec3r whole = clamp(floor(from_centre), vec3r(-AMRTEX_EXA_BORDER), vec3r(last));
   PRECISE vec3r f = from_centre - whole;
-  ivec3 i = ivec3(r.handle.x, r.handle.y, r.handle.z) + ivec3(whole);
+  ivec3 i = exa_unpack_texel(uint(r.handle.x)) + ivec3(whole);
   return exa_between(field, i, i + ivec3(1), f);
 #endif
 }
@@ -262,6 +293,19 @@ real exa_hat_sum(IN(ExaPiece) p, IN(vec3r) x) {
 }
 
 #if AMRTEX_CPP || AMRTEX_EXA_MISSING
+// Has every cell of the piece whose hat reaches x a value?
+bool exa_all_present(IN(ExaPiece) p, IN(int) field, IN(vec3r) x) {
+  ivec3 first = ivec3(floor(x - vec3r(0.5)));
+  bool all_there = true;
+  int k = 0;
+  do {
+    ivec3 c = clamp(first + ivec3(k & 1, (k >> 1) & 1, k >> 2), ivec3(0), p.cells - ivec3(1));
+    all_there = all_there && exa_has_value(field, p.texel + c);
+    k += 1;
+  } while (k < 8);
+  return all_there;
+}
+
 // Adds the piece's hats one by one; those of cells without value are left out.
 void exa_add_present(IN(ExaPiece) p, IN(int) field, IN(vec3r) x, INOUT(vec2r) sums) {
   PRECISE vec3r from_centre = x - vec3r(0.5);
@@ -284,22 +328,37 @@ void exa_add_present(IN(ExaPiece) p, IN(int) field, IN(vec3r) x, INOUT(vec2r) su
   } while (k < 8);
 }
 
-// Has the leaf cell that holds q, of the region's own brick, a value?
-bool exa_own_cell_has_value(IN(Region) r, IN(int) field, IN(int) brick, IN(vec3r) q) {
-  ExaPiece own = exa_piece(brick);
-  ivec3 cell = r.lower - own.lower + ivec3(floor(q)) * r.width;
-  return exa_has_value(field, own.texel + clamp(divide_by_width(cell, own.width), ivec3(0), own.cells - ivec3(1)));
+#if AMRTEX_CPP || AMRTEX_FILTER == AMRTEX_FILTER_BASIS
+// Has the leaf cell that holds q a value? It is of the region's first piece, or brick.
+bool exa_own_cell_has_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
+#if AMRTEX_CPP
+  ExaPiece own = AMRTEX_EXA_CELLS != 0 ? exa_brick(r, r.handle.z) : exa_piece(r, r.handle.z);
+#elif AMRTEX_EXA_CELLS
+  ExaPiece own = exa_brick(r, r.handle.z);
+#else
+  ExaPiece own = exa_piece(r, r.handle.z);
+#endif
+  // the middle of a cell of the region's width: never at a face
+  vec3r middle = (floor(q) + vec3r(0.5) + own.from_corner) * own.scale;
+  return exa_has_value(field, own.texel + clamp(ivec3(floor(middle)), ivec3(0), own.cells - ivec3(1)));
 }
 #endif
+#endif
+
+vec3r exa_piece_position(IN(ExaPiece) p, IN(vec3r) q) {
+  PRECISE vec3r x = (q + p.from_corner) * p.scale;
+  return x;
+}
 
 // Adds a piece's hats times their values, and the hats.
 void exa_add_piece(IN(Region) r, IN(ExaPiece) p, IN(int) field, IN(vec3r) q, INOUT(vec2r) sums) {
-  PRECISE vec3r finest = q * real(r.width) + vec3r(r.lower - p.lower);
-  PRECISE vec3r x = finest * (real(1) / real(p.width));
+  vec3r x = exa_piece_position(p, q);
 #if AMRTEX_CPP || AMRTEX_EXA_MISSING
-  if (AMRTEX_EXA_MISSING != 0 && r.handle.y != 0) {
-    exa_add_present(p, field, x, sums);
-    return;
+  if (AMRTEX_EXA_MISSING != 0 && exa_flag(r, AMRTEX_EXA_MISSING_FLAG)) {
+    if (!exa_all_present(p, field, x)) {
+      exa_add_present(p, field, x, sums);
+      return;
+    }
   }
 #endif
   real hats = exa_hat_sum(p, x);
@@ -333,52 +392,80 @@ vec2r exa_search_cells(IN(Region) r, IN(int) field, IN(vec3r) q) {
         top += 1;
       }
     } else if (node.w != 0u) {
-      exa_add_piece(r, exa_piece(int(node.w) - 1), field, q, sums);
+      exa_add_piece(r, exa_brick(r, int(node.w) - 1), field, q, sums);
     }
   } while (top > 0);
   return sums;
 }
 #endif
 
-vec2r exa_sums(IN(Region) r, IN(int) field, IN(vec3r) q) {
-#if AMRTEX_CPP || AMRTEX_EXA_CELLS
-  if (AMRTEX_EXA_CELLS != 0) return exa_search_cells(r, field, q);
-#endif
+#if AMRTEX_CPP || (AMRTEX_FILTER == AMRTEX_FILTER_BASIS && !AMRTEX_EXA_CELLS)
+// `own`: what the texels of the region's brick say at q.
+vec2r exa_sum_pieces(IN(Region) r, IN(int) field, IN(vec3r) q, IN(real) own) {
   vec2r sums = vec2r(0);
-  int i = r.handle.x;
-  int end = i + r.handle.w;
-  do {
-    exa_add_piece(r, exa_piece(i), field, q, sums);
+  int i = r.handle.z;
+  int end = i + (r.handle.w & ((1 << AMRTEX_EXA_PIECE_BITS) - 1));
+  if (exa_flag(r, AMRTEX_EXA_OWN_FLAG)) {
+    ExaPiece first = exa_piece(r, i);
+    sums.y = exa_hat_sum(first, exa_piece_position(first, q));
+    PRECISE real part = sums.y * own;
+    sums.x = part;
     i += 1;
-  } while (i < end);
+  }
+  if (i < end) {
+    do {
+      exa_add_piece(r, exa_piece(r, i), field, q, sums);
+      i += 1;
+    } while (i < end);
+  }
   return sums;
 }
+#endif
 
 real exa_nearest_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
-  ivec3 cells = exa_unpack_size(uint(-1 - r.handle.w));
-  ivec3 texel = ivec3(r.handle.x, r.handle.y, r.handle.z) + clamp(ivec3(floor(q)), ivec3(0), cells - ivec3(1));
+  ivec3 cells = exa_unpack_size(uint(r.handle.y));
+  ivec3 texel = exa_unpack_texel(uint(r.handle.x)) + clamp(ivec3(floor(q)), ivec3(0), cells - ivec3(1));
 #if AMRTEX_CPP || AMRTEX_EXA_MISSING
   if (AMRTEX_EXA_MISSING != 0 && !exa_has_value(field, texel)) return no_value();
 #endif
   return decode_value(exa_texel(field, texel), field);
 }
 
-real fetch_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
-  if (AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) return exa_nearest_value(r, field, q);
-  real value = real(0);
-  if (r.handle.w < 0) {
-    value = exa_plain_value(r, field, q);
-  } else {
-    bool found = true;
+#if AMRTEX_CPP || AMRTEX_FILTER == AMRTEX_FILTER_BASIS
+real exa_basis_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
 #if AMRTEX_CPP || AMRTEX_EXA_MISSING
-    if (AMRTEX_EXA_MISSING != 0 && r.handle.y != 0) found = exa_own_cell_has_value(r, field, r.handle.z, q);
-    value = no_value();
+  if (AMRTEX_EXA_MISSING != 0 && exa_flag(r, AMRTEX_EXA_MISSING_FLAG) && !exa_own_cell_has_value(r, field, q)) return no_value();
 #endif
-    if (found) {
-      vec2r sums = exa_sums(r, field, q);
-      PRECISE real quotient = sums.x * (real(1) / sums.y);
-      value = quotient;
-    }
+#if AMRTEX_CPP
+  if (AMRTEX_EXA_CELLS != 0) {
+    vec2r found = exa_search_cells(r, field, q);
+    return found.x * (real(1) / found.y);
+  }
+#elif AMRTEX_EXA_CELLS
+  vec2r found = exa_search_cells(r, field, q);
+  PRECISE real searched = found.x * (real(1) / found.y);
+  return searched;
+#endif
+#if AMRTEX_CPP || (AMRTEX_FILTER == AMRTEX_FILTER_BASIS && !AMRTEX_EXA_CELLS)
+  // one fetch for all lanes of a SIMD group: most need nothing else
+  real value = real(0);
+  if (r.handle.w == 0 || exa_flag(r, AMRTEX_EXA_OWN_FLAG)) value = exa_plain_value(r, field, q);
+  if (r.handle.w != 0) {
+    vec2r sums = exa_sum_pieces(r, field, q, value);
+    PRECISE real quotient = sums.x * (real(1) / sums.y);
+    value = quotient;
   }
   return value;
+#endif
+}
+#endif
+
+real fetch_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
+#if AMRTEX_CPP
+  return AMRTEX_FILTER == AMRTEX_FILTER_NEAREST ? exa_nearest_value(r, field, q) : exa_basis_value(r, field, q);
+#elif AMRTEX_FILTER == AMRTEX_FILTER_NEAREST
+  return exa_nearest_value(r, field, q);
+#else
+  return exa_basis_value(r, field, q);
+#endif
 }

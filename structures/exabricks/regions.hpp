@@ -25,6 +25,7 @@ struct Region {
   int brick = 0;       ///< that one
   int level = 0;       ///< whose cell faces its faces are; none of its pieces is finer
   bool plain = false;  ///< the texels of its brick give f, without a sum of hats
+  bool own = false;    ///< they give its first piece's values, without clamping to its outer cells
   int first_piece = 0;
   int pieces = 0;
   int active_bricks = 0;  ///< bricks whose supports reach in, its own included: the paper's list
@@ -287,7 +288,7 @@ class BrickRegions {
     std::vector<int> levels{at(own_).level};
     for (const int i : others) levels.push_back(at(i).level);
     std::sort(levels.begin() + 1, levels.end());
-    int finest = 0;
+    int finest = 0, own_pieces = 1;
     std::vector<int> seen;
     for (const int level : levels) {
       if (std::find(seen.begin(), seen.end(), level) != seen.end()) continue;
@@ -300,21 +301,23 @@ class BrickRegions {
       const std::vector<Part> parts = parts_of(level, box, others);
       if (parts.empty()) continue;  // only faces meet
       for (const Piece& p : pieces_of(parts)) result_.pieces.push_back(p);
+      if (level == at(own_).level) own_pieces = static_cast<int>(result_.pieces.size()) - r.first_piece;
     }
     r.pieces = static_cast<int>(result_.pieces.size()) - r.first_piece;
     r.level = level_of(box, finest);
-    r.plain = options_.pieces && make_plain(r);
+    if (options_.pieces) r.own = make_plain(r, own_pieces);
+    r.plain = r.own && r.pieces == 1;
     result_.regions.push_back(r);
   }
 
-  /// Can the region read its brick's texels as they stand? The border repeats the piece's outer cells where no other region
-  /// needs something else there: then interpolation is constant beyond their centres, which is what the quotient of the hats of a
-  /// box is.
-  bool make_plain(const Region& r) {
+  /// Can the region read its own level's piece from its brick's texels as they stand? The border repeats the piece's outer cells
+  /// where no other region needs something else there: then interpolation is constant beyond their centres, which is what the
+  /// quotient of the hats of a box is.
+  bool make_plain(const Region& r, int own_pieces) {
     if (!options_.hats) return true;
     const Piece& piece = result_.pieces[static_cast<std::size_t>(r.first_piece)];
     const Brick& own = at(own_);
-    if (r.pieces != 1 || piece.brick != own_) return false;
+    if (own_pieces != 1 || piece.brick != own_) return false;
     const Box read = reaching_cells(r.box, own.width);
     if (piece.cells.contains(read)) return true;
     if (options_.border == 0) return false;
