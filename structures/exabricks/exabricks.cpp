@@ -400,7 +400,7 @@ HostTexture make_regions(const AmrHierarchy& h, const BuildRequest& request, con
     words[1] = static_cast<std::uint32_t>(p.first_piece[i]);
     words[2] = static_cast<std::uint32_t>(r.pieces) | static_cast<std::uint32_t>(r.level) << (AMRTEX_EXA_PIECE_BITS + 1) |
                (plain ? AMRTEX_EXA_PLAIN_FLAG : 0U) | (facts.missing ? AMRTEX_EXA_MISSING_FLAG : 0U) |
-               (r.own && !facts.missing ? AMRTEX_EXA_OWN_FLAG : 0U);
+               (r.own ? AMRTEX_EXA_OWN_FLAG : 0U);
     if (p.region_words < 4) return;
     words[3] = facts.range.empty() ? kVacantRange
                                    : encode_range({facts.range.min - leak, facts.range.max + leak}, field.range_origin,

@@ -405,7 +405,15 @@ vec2r exa_sum_pieces(IN(Region) r, IN(int) field, IN(vec3r) q, IN(real) own) {
   vec2r sums = vec2r(0);
   int i = r.handle.z;
   int end = i + (r.handle.w & ((1 << AMRTEX_EXA_PIECE_BITS) - 1));
-  if (exa_flag(r, AMRTEX_EXA_OWN_FLAG)) {
+  bool reads_own = exa_flag(r, AMRTEX_EXA_OWN_FLAG);
+#if AMRTEX_CPP || AMRTEX_EXA_MISSING
+  if (reads_own && AMRTEX_EXA_MISSING != 0 && exa_flag(r, AMRTEX_EXA_MISSING_FLAG)) {
+    ExaPiece marked = exa_piece(r, i);
+    reads_own = exa_all_present(marked, field, exa_piece_position(marked, q));
+    if (reads_own && i + 1 == end) return vec2r(own, real(1));  // what a plain region without the mark has, to the bit
+  }
+#endif
+  if (reads_own) {
     ExaPiece first = exa_piece(r, i);
     sums.y = exa_hat_sum(first, exa_piece_position(first, q));
     PRECISE real part = sums.y * own;
