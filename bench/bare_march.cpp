@@ -7,6 +7,9 @@
 #include <optional>
 
 #include "bench/runner.hpp"
+#include "renderers/draw_target.hpp"
+#include "renderers/gpu_timer.hpp"
+#include "renderers/raycaster.hpp"
 
 namespace amrtex {
 namespace {

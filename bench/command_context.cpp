@@ -52,11 +52,20 @@ Json encodings_json(const ContextInfo* context) {
       entry["parameters"].push_back(
           {{"name", p.name}, {"description", p.description}, {"default", p.default_value}, {"accepted", p.accepted}});
     const Support support = context != nullptr ? e->supported(*context) : Support{false, "no GL context on this machine"};
+    entry["unsupported_values"] = Json::array();
+    if (context != nullptr)
+      for (const UnsupportedValue& v : e->unsupported_values(*context))
+        entry["unsupported_values"].push_back({{"parameter", v.parameter}, {"value", v.value}, {"reason", v.reason}});
     entry["supported"] = support.ok;
     entry["reason"] = support.ok ? Json(nullptr) : Json(support.reason);
     list.push_back(entry);
   }
   return list;
+}
+
+void print_unsupported_values(const Json& entry, std::string_view before) {
+  for (const Json& v : entry["unsupported_values"])
+    fmt::print("{} {} {}: {}\n", before, v["parameter"].get<std::string>(), v["value"].dump(), v["reason"].get<std::string>());
 }
 
 int print_encodings(bool json) {
@@ -74,6 +83,7 @@ int print_encodings(bool json) {
       fmt::print("  {}: {}; {} (default {})\n", p["name"].get<std::string>(), p["description"].get<std::string>(),
                  p["accepted"].get<std::string>(), p["default"].dump());
     if (!e["supported"].get<bool>()) fmt::print("  cannot run here: {}\n", e["reason"].get<std::string>());
+    print_unsupported_values(e, "  cannot run here with");
   }
   return 0;
 }
@@ -93,9 +103,15 @@ void print_context(const Way& way, const ContextProbe& p) {
              i.max_viewport_width, i.max_viewport_height, i.timer_bits);
   fmt::print("  bindless textures   {}\n  shader ballot       {}\n  extensions          {}\n", i.bindless_texture ? "yes" : "no",
              i.shader_ballot ? "yes" : "no", i.extensions.size());
-  for (const Json& e : encodings_json(&i))
+  if (i.bindless_texture)
+    fmt::print("  texture handles     {}{}\n",
+               i.has_handle_limit() ? fmt::format("{} at most", i.max_resident_handles) : "no limit known",
+               i.handles_may_differ ? "" : ", served in turn where they differ");
+  for (const Json& e : encodings_json(&i)) {
     fmt::print("  encoding {:11} {}\n", e["name"].get<std::string>(),
                e["supported"].get<bool>() ? "can run" : "cannot run: " + e["reason"].get<std::string>());
+    print_unsupported_values(e, "                       not with");
+  }
 }
 
 int doctor(bool json) {

@@ -122,8 +122,8 @@ void add_mesh_commands(CLI::App& app, Command& chosen) {
       "them.");
   convert->callback([a, &chosen] {
     chosen = [a] {
-      write_amrex_plotfile(AmrHierarchy(read_mesh(a->input, a->field.empty() ? std::vector<std::string>() : std::vector{a->field})),
-                           a->output);
+      write_amrex_plotfile(
+          AmrHierarchy(read_mesh(a->input, a->field.empty() ? std::vector<std::string>() : std::vector{a->field})), a->output);
       return 0;
     };
   });

@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "bench/commands.hpp"
+#include "bench/error_split.hpp"
 #include "renderers/probe.hpp"
 #include "structures/mesh_io.hpp"
 
@@ -52,19 +53,6 @@ struct Sampled {
   std::optional<double> reference;
   ProbeResult encoding_double, encoding_gl;
 };
-
-/// The same structure with a double payload: what the encoding itself does to the field. Layouts that
-/// hold samples of one format alone keep that.
-EncodedField build_exact(const Encoding& encoding, const AmrHierarchy& mesh, BuildRequest request) {
-  const Storage storage = request.storage;
-  request.storage = Storage::r64f;
-  try {
-    return encoding.build(mesh, request);
-  } catch (const UnsupportedError&) {
-    request.storage = storage;
-    return encoding.build(mesh, request);
-  }
-}
 
 std::vector<Sampled> sample(const Arguments& a) {
   const Encoding& encoding = find_encoding(a.encoding);

@@ -19,6 +19,7 @@ void add_context_commands(CLI::App& app, Command& chosen);  // encodings, doctor
 void add_sample_command(CLI::App& app, Command& chosen);
 void add_render_command(CLI::App& app, Command& chosen);
 void add_run_commands(CLI::App& app, Command& chosen);  // run, report
+void add_verify_command(CLI::App& app, Command& chosen);
 
 /// "512MiB", "2GiB", "1000000". Throws UsageError.
 std::int64_t parse_bytes(const std::string& text);

@@ -21,20 +21,22 @@ using Choice = std::vector<std::pair<std::string, JsonNode>>;
 
 constexpr int kMaxPictureEdge = 16384;
 constexpr int kMaxFrames = 1000000;
+constexpr int kMostLevel = 63;
 constexpr double kAnyNumber = std::numeric_limits<double>::max();
 
-constexpr std::array<std::string_view, 16> kAvailableRenderKeys = {
-    "mode",       "sampling",  "step",        "width",         "height",        "skip",    "early_end", "consumer",
-    "integrator", "isovalues", "iso_opacity", "surface_color", "iso_tolerance", "shading", "output",    "color_field"};
-constexpr std::array<std::string_view, 4> kLaterRenderKeys = {"tolerance", "prune", "level_of_detail", "clip_planes"};
-constexpr std::array<std::string_view, 1> kConsumers = {"raycast"};
-constexpr std::array<std::string_view, 1> kIntegrators = {"exponential_midpoint"};
+constexpr auto kAvailableRenderKeys = std::to_array<std::string_view>(
+    {"mode",      "sampling",     "step",        "width",       "height",      "skip",          "early_end",
+     "consumer",  "slice_target", "integrator",  "isovalues",   "iso_opacity", "surface_color", "iso_tolerance",
+     "shading",   "output",       "color_field", "point_light", "ambient",     "shadow_step",   "level_of_detail",
+     "max_level", "tolerance",    "prune",       "needs"});
+constexpr std::array<std::string_view, 1> kLaterRenderKeys = {"clip_planes"};
+constexpr std::array<std::string_view, 2> kNeeds = {"scene", "all"};
 constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
 
 /// How many lists deep one value of this key is; what lies deeper is an axis.
 int value_depth(std::string_view key) {
   if (key == "extinction" || key == "color" || key == "surface_color") return 2;
-  constexpr std::array<std::string_view, 10> lists = {"more_fields", "eye",         "at",   "up",    "isovalues",
+  constexpr std::array<std::string_view, 11> lists = {"point_light", "more_fields", "eye",  "at",    "up",         "isovalues",
                                                       "iso_opacity", "clip_planes", "root", "ratio", "skip_levels"};
   return std::find(lists.begin(), lists.end(), key) != lists.end() ? 1 : 0;
 }
@@ -77,6 +79,8 @@ Json unnamed_render_json(const RenderPoint& render) {
   Json json = render_json(render);
   json.erase("view_name");
   json.erase("transfer_function_name");
+  if (!render.settings.prune) json.erase("prune");  // older records keep their names
+  if (!render.settings.everything) json.erase("needs");
   return json;
 }
 
@@ -98,9 +102,9 @@ class Parser {
 
  private:
   void accept_root_keys() const {
-    Names keys = {"name",      "datasets", "encodings",         "filters", "storage", "filtering",
-                  "render",    "views",    "transfer_function", "frames",  "warm_up", "seed",
-                  "reference", "context",  "memory_limit",      "check",   "baseline"};
+    Names keys = {"name",      "datasets", "encodings",         "filters", "storage",  "filtering",
+                  "render",    "views",    "transfer_function", "frames",  "warm_up",  "seed",
+                  "reference", "context",  "memory_limit",      "check",   "baseline", "explain_error"};
     if (scene_) keys.push_back("region");
     root_.accept_keys(keys);
   }
@@ -303,6 +307,10 @@ class Parser {
     const std::vector<RenderPoint> settings = parse_settings();
     const std::vector<RenderPoint> views = parse_views();
     const std::vector<RenderPoint> functions = parse_transfer_functions();
+    for (const RenderPoint& point : settings)
+      if (point.settings.prune && functions.size() > 1)
+        root_.find("transfer_function")
+            ->fail("with 'prune' the transfer function may not change: what one hides another may show; accepted: one");
     for (const RenderPoint& view : views)
       for (const RenderPoint& function : functions)
         for (RenderPoint render : settings) {
@@ -356,12 +364,52 @@ class Parser {
   static RenderPoint parse_setting(const Choice& choice) {
     RenderPoint point;
     for (const auto& [key, node] : choice) set(point, key, node);
-    if (!point.settings.draws_volume()) point.settings.early_end.reset();  // no opacity to end at
+    finish_integrator(point.settings, choice);
+    if (!point.settings.draws_volume()) point.settings.early_end.reset();                    // no opacity to end at
+    if (!point.settings.draws_slices()) point.settings.slice_target = SliceTarget::rgba32f;  // nothing is blended there
     if (point.settings.draws_surfaces())
       finish_surfaces(point.settings.isosurfaces, choice);
     else
       point.settings.isosurfaces = {};  // other modes have no use for it
+    set_light(point.settings, choice);
+    if (point.settings.prune) require_prunable(point.settings, *find(choice, "prune"));
     return point;
+  }
+
+  /// Complaints name the key they are about.
+  static void set_light(RenderSettings& s, const Choice& choice) {
+    const JsonNode* position = find(choice, "point_light");
+    const bool lit = position != nullptr && !position->json().is_null();
+    for (const char* key : {"ambient", "shadow_step"})
+      if (const JsonNode* node = find(choice, key); node != nullptr && !lit)
+        node->fail("belongs to the key 'point_light', which accepts three numbers [x, y, z]");
+    if (!lit) return;
+    const std::vector<double> p = numbers(*position);
+    if (!position->json().is_array() || p.size() != 3) position->fail("accepted: three numbers [x, y, z]");
+    PointLight& light = s.point_light.emplace();
+    light.position = {p[0], p[1], p[2]};
+    if (const JsonNode* node = find(choice, "ambient")) light.ambient = node->number(0, 1);
+    if (const JsonNode* node = find(choice, "shadow_step")) light.shadow_step = node->positive_number();
+    located(*position, [&] { validate_light(s); });
+  }
+
+  /// A tolerance without integrator asks for the one that knows it; others have no use for it, as that has none for a step.
+  static void finish_integrator(RenderSettings& s, const Choice& choice) {
+    const JsonNode* tolerance = find(choice, "tolerance");
+    const JsonNode* integrator = find(choice, "integrator");
+    if (tolerance != nullptr && integrator == nullptr) s.integrator = Integrator::tolerance;
+    if (s.integrator != Integrator::tolerance) s.tolerance = RenderSettings{}.tolerance;
+    if (s.integrator == Integrator::tolerance) s.step = RenderSettings{}.step;
+    try {
+      validate_integrator(s);
+    } catch (const Error& e) {
+      (integrator != nullptr ? integrator : tolerance)->fail(e.what());
+    }
+  }
+
+  /// What is not built cannot be seen later.
+  static void require_prunable(const RenderSettings& s, const JsonNode& prune) {
+    located(prune, [&] { validate_prune(s); });
   }
 
   /// One opacity stands for all isovalues; complaints name the key they are about.
@@ -408,6 +456,12 @@ class Parser {
     if (key == "color_field" && !node.json().is_null()) iso.color_field = node.text();
   }
 
+  static double tolerance_of(const JsonNode& node) {
+    const double tolerance = node.positive_number();
+    if (tolerance > 1) node.fail(fmt::format("{} is more than a channel holds; accepted: a number in (0, 1]", tolerance));
+    return tolerance;
+  }
+
   static void set(RenderPoint& point, const std::string& key, const JsonNode& node) {
     RenderSettings& s = point.settings;
     set_surfaces(s.isosurfaces, key, node);
@@ -417,9 +471,15 @@ class Parser {
     if (key == "width") s.width = static_cast<int>(node.integer(1, kMaxPictureEdge));
     if (key == "height") s.height = static_cast<int>(node.integer(1, kMaxPictureEdge));
     if (key == "skip") s.skip = node.boolean();
+    if (key == "prune") s.prune = node.boolean();
+    if (key == "needs") s.everything = node.one_of(kNeeds) == "all";
     if (key == "early_end" && !node.json().is_null()) s.early_end = node.number(0, 1);
-    if (key == "consumer") point.consumer = node.one_of(kConsumers);
-    if (key == "integrator") point.integrator = node.one_of(kIntegrators);
+    if (key == "consumer") s.consumer = located(node, [&] { return parse_consumer(node.text()); });
+    if (key == "slice_target") s.slice_target = located(node, [&] { return parse_slice_target(node.text()); });
+    if (key == "level_of_detail" && !node.json().is_null()) s.level_of_detail = node.positive_number();
+    if (key == "max_level" && !node.json().is_null()) s.max_level = static_cast<int>(node.integer(0, kMostLevel));
+    if (key == "integrator") s.integrator = located(node, [&] { return parse_integrator(node.text()); });
+    if (key == "tolerance") s.tolerance = tolerance_of(node);
   }
 
   /// Where the parser of views or transfer functions complains about a combination.
@@ -521,6 +581,11 @@ class Parser {
       experiment_.minimum_psnr_db = check->require("psnr_db").number(0, 1000);
     }
     if (const auto baseline = root_.find("baseline")) experiment_.baseline = baseline->boolean();
+    if (const auto explain = root_.find("explain_error")) {
+      experiment_.explain_error = explain->boolean();
+      if (experiment_.explain_error && !experiment_.reference)
+        explain->fail("a picture without a reference has no error to explain");
+    }
     if (const auto region = root_.find("region")) parse_region(*region);
   }
 
@@ -600,22 +665,36 @@ Json surfaces_json(const Isosurfaces& iso) {
   return json;
 }
 
+Json light_json(const PointLight& light) {
+  const Vec3d& p = light.position;
+  return {{"point_light", {p.x, p.y, p.z}}, {"ambient", light.ambient}, {"shadow_step", light.shadow_step}};
+}
+
 Json render_json(const RenderPoint& render) {
   const RenderSettings& s = render.settings;
-  Json json = {{"consumer", render.consumer},
+  const bool by_tolerance = s.integrator == Integrator::tolerance;
+  Json json = {{"consumer", consumer_name(s.consumer)},
                {"mode", mode_name(s.mode)},
                {"sampling", sampling_name(s.sampling)},
-               {"step", s.step},
-               {"integrator", render.integrator},
+               {"step", by_tolerance ? Json() : Json(s.step)},
+               {"integrator", integrator_name(s.integrator)},
                {"width", s.width},
                {"height", s.height},
                {"skip", s.skip},
+               {"prune", s.prune},
+               {"needs", s.everything ? "all" : "scene"},
                {"early_end", json_or_null(s.early_end)},
                {"view", to_json(render.view)},
                {"view_name", render.view_name},
                {"transfer_function", nullptr},
                {"transfer_function_name", nullptr}};
+  if (s.draws_slices()) json["slice_target"] = slice_target_name(s.slice_target);
+  if (by_tolerance) json["tolerance"] = s.tolerance;
   if (s.draws_surfaces()) json.update(surfaces_json(s.isosurfaces));
+  if (s.point_light) json.update(light_json(*s.point_light));
+  // only where they are in use, so that the names of other records stay
+  if (s.level_of_detail) json["level_of_detail"] = *s.level_of_detail;
+  if (s.max_level) json["max_level"] = *s.max_level;
   if (!render.transfer_function_name.empty()) {
     json["transfer_function"] = to_json(render.transfer_function);
     json["transfer_function_name"] = render.transfer_function_name;
@@ -631,6 +710,7 @@ Json point_configuration(const Experiment& experiment, const BuildPoint& build, 
   if (experiment.reference) {
     const auto& common = experiment.reference->common_filter;
     reference = {{"step", experiment.reference->step}, {"filter", common ? filter_name(*common) : "own"}};
+    if (experiment.explain_error) reference["explain"] = true;  // absent elsewhere: older records keep their names
   }
   return {{"experiment", experiment.name},
           {"dataset", dataset_hash},

@@ -37,8 +37,6 @@ struct BuildPoint {
 /// One picture of every structure.
 struct RenderPoint {
   RenderSettings settings;
-  std::string consumer = "raycast";
-  std::string integrator = "exponential_midpoint";
   View view;
   std::string view_name;               ///< as given, or "view 2": its place in the list
   TransferFunction transfer_function;  ///< without points where the mode has no use for it
@@ -70,6 +68,7 @@ struct Experiment {
   /// The data set's first build, drawn with the first render settings, is timed before and
   /// after every point, so that times are ratios inside one run.
   bool baseline = false;
+  bool explain_error = false;     ///< records hold the error by cause, for several more pictures a point (bench/error_split.hpp)
   std::vector<std::string> axes;  ///< places in the file whose list has more than one value
 
   std::size_t points() const { return builds.size() * renders.size(); }
@@ -90,6 +89,9 @@ Scene scene_of(const Experiment& experiment, const RenderPoint& render);
 
 /// What a record and the name of a reference hold of isosurfaces.
 Json surfaces_json(const Isosurfaces& isosurfaces);
+
+/// What a record holds of a lamp.
+Json light_json(const PointLight& light);
 
 /// The `render` part of a record, names of view and transfer function included.
 Json render_json(const RenderPoint& render);

@@ -71,6 +71,30 @@ ErrorMetrics compare(const Picture& picture, const Picture& reference) {
   return error;
 }
 
+std::vector<double> pixel_errors(const Picture& picture, const Picture& reference) {
+  require_same_shape(picture, reference);
+  const auto channels = static_cast<std::size_t>(picture.channels);
+  std::vector<double> errors(picture.values.size() / channels, 0);
+  for (std::size_t i = 0; i < picture.values.size(); ++i) {
+    const double v = picture.values[i], r = reference.values[i];
+    if (same_special(v, r)) continue;
+    if (!std::isfinite(v) || !std::isfinite(r)) throw_special(picture, i, v, r);
+    errors[i / channels] = std::max(errors[i / channels], std::abs(v - r));
+  }
+  std::sort(errors.begin(), errors.end());
+  return errors;
+}
+
+double percentile(const std::vector<double>& errors, double share) {
+  const double rank = std::ceil(share * static_cast<double>(errors.size()));
+  return errors.at(static_cast<std::size_t>(std::max(rank, 1.0)) - 1);
+}
+
+double share_within(const std::vector<double>& errors, double bound) {
+  const auto end = std::upper_bound(errors.begin(), errors.end(), bound);
+  return static_cast<double>(end - errors.begin()) / static_cast<double>(errors.size());
+}
+
 bool reaches_psnr(const ErrorMetrics& error, double psnr_db) {
   return error.rmse == 0 || (error.psnr_db && *error.psnr_db >= psnr_db);
 }

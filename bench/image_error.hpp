@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "renderers/picture.hpp"
 
@@ -23,6 +24,13 @@ struct ErrorMetrics {
 /// one of them is no number to average but a wrong picture: Error naming the pixel.
 /// Throws Error when sizes or channels differ.
 ErrorMetrics compare(const Picture& picture, const Picture& reference);
+
+/// Largest difference of each pixel's channels, ascending.
+std::vector<double> pixel_errors(const Picture& picture, const Picture& reference);
+/// The error that this share of the pixels does not exceed, from `pixel_errors`.
+double percentile(const std::vector<double>& pixel_errors, double share);
+/// Share of the pixels whose error is at most `bound`.
+double share_within(const std::vector<double>& pixel_errors, double bound);
 
 /// Whether the picture is plausible: perfect, or at least `psnr_db`.
 bool reaches_psnr(const ErrorMetrics& error, double psnr_db);

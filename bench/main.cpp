@@ -54,6 +54,7 @@ int main(int argc, char** argv) {
   amrtex::add_sample_command(app, chosen);
   amrtex::add_render_command(app, chosen);
   amrtex::add_run_commands(app, chosen);
+  amrtex::add_verify_command(app, chosen);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -205,6 +205,17 @@ void check_frame(const Json& frame) {
     fail("/frame/wall_ms/n", fmt::format("is not the number of samples, {}", all.size()));
 }
 
+/// Causes that were not measured are left out or null.
+void check_split(const Json& error) {
+  if (error.is_null() || error.at("split").is_null()) return;
+  for (const auto& [cause, difference] : error.at("split").items()) {
+    if (difference.is_null()) continue;
+    for (const char* key : {"rmse", "max"})
+      if (!difference.is_object() || !difference.contains(key) || !difference.at(key).is_number())
+        fail(fmt::format("/error/split/{}/{}", cause, key), "a number is expected");
+  }
+}
+
 /// Sorted keys, and whole floats as integers, so that equal configurations have equal texts.
 nlohmann::json canonical(const Json& json) {
   if (json.is_object()) {
@@ -308,7 +319,8 @@ Json timing_json(std::span<const double> samples_ms) {
 Json memory_json(const EncodedField& field, std::int64_t leaf_cells) {
   const MemoryByRole roles = field.memory();
   Json texels = Json::object();
-  for (const HostTexture& texture : field.textures) texels[texture.name] = texture.texels();
+  for (const HostTexture& texture : field.textures)  // textures of a set share a name
+    texels[texture.name] = texels.value(texture.name, std::int64_t{0}) + texture.texels();
   Json per_cell = nullptr;
   const std::int64_t values = leaf_cells * field.field_count;
   if (values > 0) per_cell = static_cast<double>(field.value_texels()) / static_cast<double>(values);
@@ -343,6 +355,7 @@ void validate_record(const Json& record) {
   check_status(record);
   check_memory(record.at("memory"));
   check_frame(record.at("frame"));
+  check_split(record.at("error"));
 }
 
 std::string configuration_hash(const Json& configuration) {

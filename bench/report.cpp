@@ -118,6 +118,15 @@ Cell status_cell(const Json& record, const Group&) {
   return reason.empty() ? status : fmt::format("{}: {}", status, reason);
 }
 
+/// What was left out for want of need, and because it is hidden.
+Cell left_out_cell(const Json& record, const Group&) {
+  const Json& list = at(record, "/left_out");
+  if (!list.is_array()) return std::monostate();
+  double bytes = 0;
+  for (const Json& item : list) bytes += item.at("bytes").get<double>();
+  return bytes / kMebibyte;
+}
+
 bool is_linear(const Json& record) { return text_of(at(record, "/filter")) != "nearest"; }
 
 bool same(const Json& a, const Json& b, const char* pointer) { return at(a, pointer) == at(b, pointer); }
@@ -157,12 +166,19 @@ constexpr ColumnRule kColumns[] = {
     {"filtering", "filtering", "", Role::setting, false, value<"/filtering">},
     {"storage", "storage", "", Role::setting, false, value<"/storage">},
     {"consumer", "consumer", "", Role::setting, false, value<"/render/consumer">},
+    {"slice_target", "slice target", "", Role::setting, false, value<"/render/slice_target">},
     {"mode", "mode", "", Role::setting, false, value<"/render/mode">},
     {"sampling", "sampling", "", Role::setting, false, value<"/render/sampling">},
     {"step", "step (cells)", "", Role::setting, true, value<"/render/step">},
+    {"tolerance", "tolerance", "", Role::setting, true, value<"/render/tolerance">},
     {"integrator", "integrator", "", Role::setting, false, value<"/render/integrator">},
     {"picture", "picture (pixels)", "", Role::setting, false, picture_cell},
     {"skip", "skip", "", Role::setting, false, value<"/render/skip">},
+    {"level_of_detail", "level of detail", "pixels", Role::setting, true, value<"/render/level_of_detail">},
+    {"max_level", "max level", "", Role::setting, true, value<"/render/max_level">},
+    {"point_light", "lamp", "", Role::setting, false, value<"/render/point_light">},
+    {"needs", "needs", "", Role::setting, false, value<"/render/needs">},
+    {"prune", "prune", "", Role::setting, false, value<"/render/prune">},
     {"early_end", "early end (opacity)", "", Role::setting, true, value<"/render/early_end">},
     {"view", "view", "", Role::setting, false, named<"/render/view_name", "/render/view">},
     {"transfer_function", "transfer function", "", Role::setting, false,
@@ -173,6 +189,7 @@ constexpr ColumnRule kColumns[] = {
     {"topology", "topology (MiB)", "", Role::measure, true, mebibytes<"/memory/by_role/topology">},
     {"padding", "padding (MiB)", "", Role::measure, true, mebibytes<"/memory/by_role/padding">},
     {"texels_per_cell", "texels per cell", "", Role::measure, true, value<"/memory/texels_per_cell">},
+    {"left_out", "left out (MiB)", "", Role::measure, true, left_out_cell},
     {"build", "build (s)", "", Role::measure, true, value<"/build_seconds">},
     {"upload", "upload (s)", "", Role::measure, true, value<"/upload_seconds">},
     {"wall", "frame wall (ms)", "", Role::measure, true, timing<"/frame/wall_ms">},
@@ -187,20 +204,36 @@ constexpr ColumnRule kColumns[] = {
     {"samples", "samples", "", Role::measure, true, value<"/work/samples">},
     {"regions", "regions", "", Role::measure, true, value<"/work/regions">},
     {"regions_skipped", "regions skipped", "", Role::measure, true, value<"/work/regions_skipped">},
+    {"passes", "passes", "", Role::measure, true, value<"/work/passes">},
     {"rmse", "RMSE", "", Role::measure, true, value<"/error/rmse">},
     {"max_error", "max error", "", Role::measure, true, value<"/error/max">},
+    {"p95_error", "95th percentile", "", Role::measure, true, value<"/error/p95">},
+    {"within_tolerance", "within tolerance", "", Role::measure, true, value<"/error/within_tolerance">},
     {"mrse", "MRSE", "", Role::measure, true, value<"/error/mrse">},
     {"psnr", "PSNR (dB)", "", Role::measure, true, value<"/error/psnr_db">},
     {"psnr_common", "PSNR, common (dB)", "", Role::measure, true, value<"/error_common/psnr_db">},
     {"rmse_common", "RMSE, common", "", Role::measure, true, value<"/error_common/rmse">},
+    {"split_step", "step", "", Role::measure, true, value<"/error/split/step/rmse">},
+    {"split_encoding", "encoding", "", Role::measure, true, value<"/error/split/encoding/rmse">},
+    {"split_storage", "storage", "", Role::measure, true, value<"/error/split/storage/rmse">},
+    {"split_arithmetic", "arithmetic", "", Role::measure, true, value<"/error/split/arithmetic/rmse">},
+    {"split_driver", "driver", "", Role::measure, true, value<"/error/split/driver/rmse">},
+    {"split_filtering", "filtering", "", Role::measure, true, value<"/error/split/filtering/rmse">},
+    {"split_early_end", "early end", "", Role::measure, true, value<"/error/split/early_end/rmse">},
+    {"split_level_of_detail", "level of detail", "", Role::measure, true, value<"/error/split/level_of_detail/rmse">},
+    {"split_filter", "filter", "", Role::measure, true, value<"/error/split/filter/rmse">},
     {"status", "status", "", Role::measure, false, status_cell},
 };
 
+/// The error by cause has a table of its own.
+bool is_split(const ColumnRule& rule) { return std::string_view(rule.key).starts_with("split_"); }
+
 /// Measures that a table has unless others are chosen.
 bool is_default(const ColumnRule& rule) {
-  constexpr std::array<std::string_view, 11> on_demand = {"baseline",        "upload",         "rays",        "regions_skipped",
-                                                          "max_error",       "mrse",           "rmse_common", "pages",
-                                                          "border_overhead", "border_formula", "oversampling"};
+  if (is_split(rule)) return false;
+  constexpr auto on_demand = std::to_array<std::string_view>(
+      {"left_out", "p95_error", "within_tolerance", "baseline", "upload", "rays", "regions_skipped", "max_error", "mrse",
+       "rmse_common", "pages", "border_overhead", "border_formula", "oversampling", "passes"});
   return std::find(on_demand.begin(), on_demand.end(), rule.key) == on_demand.end();
 }
 
@@ -238,7 +271,7 @@ Json order_key(const Json& record) {
   for (const Json& part : {Json(filter_rank(filter)), Json(filter), at(record, "/storage"), at(record, "/filtering")})
     key.push_back(part);
   for (const char* pointer : {"/render/view_name", "/render/transfer_function_name", "/render/consumer", "/render/mode",
-                              "/render/sampling", "/render/step", "/render/width", "/render/height"})
+                              "/render/sampling", "/render/step", "/render/tolerance", "/render/width", "/render/height"})
     key.push_back(at(record, pointer));
   key.push_back(record.dump(-1, ' ', false, Json::error_handler_t::replace));  // ties must not depend on the order of files
   return key;
@@ -347,6 +380,29 @@ Table make_table(const std::string& experiment, const std::string& renderer, con
   return table;
 }
 
+/// Root mean squares of the differences that each cause makes, where records hold them; what `filter` does is no part of the
+/// error.
+std::optional<Table> make_split_table(const std::string& experiment, const std::string& renderer, const Records& records) {
+  Records explained;
+  std::copy_if(records.begin(), records.end(), std::back_inserter(explained),
+               [](const Json* record) { return at(*record, "/error/split").is_object(); });
+  if (explained.empty()) return std::nullopt;
+  Table table;
+  table.title = experiment + ": error by cause (RMSE)";
+  table.constants.emplace_back("renderer", renderer);
+  const Group group{in_order(explained), varying_parameters(explained, true)};
+  table.rows.resize(explained.size());
+  for (const ColumnRule& rule : kColumns) {
+    const std::vector<Cell> cells = column_cells(rule, group);
+    const bool varies = rule.role == Role::setting && !all_equal(cells);
+    if (varies || std::string_view(rule.key) == "encoding" || (is_split(rule) && !all_absent(cells)))
+      add_column(table, rule, cells);
+  }
+  add_column(table, find_rule("rmse"), column_cells(find_rule("rmse"), group));
+  table.columns.back().label = "all";
+  return table;
+}
+
 }  // namespace
 
 std::vector<std::string_view> column_keys() {
@@ -362,7 +418,10 @@ std::vector<Table> make_tables(std::span<const Json> records, const ReportOption
     groups[{text_of(at(record, "/experiment")), renderer.is_null() ? "none" : text_of(renderer)}].push_back(&record);
   }
   std::vector<Table> tables;
-  for (const auto& [names, members] : groups) tables.push_back(make_table(names.first, names.second, members, options));
+  for (const auto& [names, members] : groups) {
+    tables.push_back(make_table(names.first, names.second, members, options));
+    if (auto split = make_split_table(names.first, names.second, members)) tables.push_back(std::move(*split));
+  }
   return tables;
 }
 

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "bench/environment.hpp"
+#include "bench/error_split.hpp"
 #include "bench/image_error.hpp"
 #include "bench/record.hpp"
 #include "bench/statistics.hpp"
@@ -35,6 +36,7 @@ class Stopwatch {
 
 /// A structure on the context, with what was measured on the way there.
 struct Built {
+  BuildRequest request;
   EncodedField field;
   std::unique_ptr<GpuField> gpu;
   double build_seconds = 0;
@@ -80,7 +82,7 @@ class Runner {
   void load(std::size_t dataset) {
     if (mesh_ && loaded_ == dataset) return;
     baseline_.reset();
-    baseline_caster_.reset();
+    baseline_consumer_.reset();
     mesh_.emplace(load_dataset(experiment_, experiment_.datasets[dataset]));
     loaded_ = dataset;
     mesh_hash_ = mesh_->content_hash(0);
@@ -119,7 +121,7 @@ class Runner {
   void measure_all(const BuildPoint& build, const std::vector<const RenderPoint*>& renders) {
     std::unique_ptr<Built> built;
     try {
-      built = make(build, renders.front()->settings);
+      built = make(build, scene_of(experiment_, *renders.front()));
     } catch (const UsageError&) {
       throw;  // a bad parameter concerns the whole experiment
     } catch (const std::exception& error) {
@@ -139,20 +141,19 @@ class Runner {
     }
   }
 
-  std::unique_ptr<Built> make(const BuildPoint& build, const RenderSettings& settings) {
+  std::unique_ptr<Built> make(const BuildPoint& build, const Scene& scene) {
     BuildRequest request;
     request.storage = build.storage;
     request.parameters = build.parameters;
     request.context = context_->info();
     request.memory_limit = experiment_.memory_limit.value_or(request.memory_limit);
-    Scene scene;
-    scene.settings = settings;
     request.needs = scene_needs(scene, build.filter, build.filtering);
     request.more_fields = more_fields(*mesh_, scene);
     const Encoding& encoding = find_encoding(build.encoding);
     if (const Support support = encoding.supported(request.context); !support.ok)
       throw UnsupportedError(fmt::format("encoding {}: {}", build.encoding, support.reason));
     auto built = std::make_unique<Built>();
+    built->request = request;
     const Stopwatch building;
     built->field = encoding.build(*mesh_, request);
     built->build_seconds = building.seconds();
@@ -166,43 +167,54 @@ class Runner {
   void measure(const BuildPoint& build, Built& built, const RenderPoint& render) {
     const Scene scene = scene_of(experiment_, render);
     const Stopwatch first;
-    Raycaster raycaster(*context_, *mesh_, built.field, *built.gpu, scene);
-    raycaster.draw();
+    const auto consumer = make_consumer(*context_, *mesh_, built.field, *built.gpu, scene);
+    consumer->draw();
     const double first_frame_ms = first.seconds() * 1000;
-    const Picture picture = raycaster.read();
+    const Picture picture = consumer->read();
 
     Json record = blank_record(Status::ok);
     describe(record, build, render, &built);
     record["first_frame_ms"] = first_frame_ms;
     record["image_hash"] = picture_hash(picture);
-    record["context"]["shader_hash"] = raycaster.shader_hash();
+    record["context"]["shader_hash"] = consumer->shader_hash();
     for (const std::string& text : scene_warnings(*mesh_, scene)) warn(record, text);
-    if (!raycaster.transfer_exact())
+    if (scene.settings.slice_target == SliceTarget::rgba8)
+      warn(record, "slices were blended in 8 bits a channel (slice_target rgba8): a historical control");
+    if (!consumer->transfer_exact())
       warn(record, "the transfer function has more than 16 points: it is drawn from a table of 4096 bins");
-    if (!add_errors(record, picture, built.field, scene)) {
+    if (!add_errors(record, picture, built, scene)) {
       write(build, render, record);
       return;  // a wrong picture gets no time
     }
     write_png(picture, picture_path(build, render));
-    const WorkCounts work = raycaster.count();
-    record["work"] = {
-        {"rays", work.rays}, {"samples", work.samples}, {"regions", work.regions}, {"regions_skipped", work.regions_skipped}};
-    if (render.frames > 0) add_times(record, build, render, raycaster);
+    const WorkCounts work = consumer->count();
+    record["work"] = {{"rays", work.rays},
+                      {"samples", work.samples},
+                      {"regions", work.regions},
+                      {"regions_skipped", work.regions_skipped},
+                      {"passes", work.passes}};
+    if (render.frames > 0) add_times(record, build, render, *consumer);
     write(build, render, record);
   }
 
   static void warn(Json& record, const std::string& text) { record["context"]["warnings"].push_back(text); }
 
   /// False when the picture is wrong.
-  bool add_errors(Json& record, const Picture& picture, const EncodedField& field, const Scene& scene) {
+  bool add_errors(Json& record, const Picture& picture, const Built& built, const Scene& scene) {
     if (!experiment_.reference) return true;
     const ReferenceSettings& reference = *experiment_.reference;
     const fs::path cache = options_.folder / "references";
     std::string hash;
-    const Picture own = cached_reference(*mesh_, field.definition, scene, reference.step, cache, hash);
+    const Picture own = cached_reference(*mesh_, built.field.definition, scene, reference.step, cache, hash);
     const ErrorMetrics error = compare(picture, own);
     record["error"] = error_json(error, hash);
-    record["error"]["split"] = nullptr;
+    record["error"]["split"] = experiment_.explain_error ? explain(built, scene, own, picture) : Json();
+    if (!experiment_.explain_error && scene.settings.prunes_levels())
+      record["error"]["split"]["level_of_detail"] = pruning_error(built, scene, picture);
+    const std::vector<double> pixels = pixel_errors(picture, own);
+    record["error"]["p95"] = percentile(pixels, 0.95);
+    if (scene.settings.integrator == Integrator::tolerance)
+      record["error"]["within_tolerance"] = share_within(pixels, scene.settings.tolerance);
     if (reference.common_filter) {
       FilterDefinition common{*reference.common_filter, 0, mesh_->finest_level()};
       if (common.filter != Filter::linear_page) common.page_level = 0;
@@ -219,14 +231,33 @@ class Runner {
     return true;
   }
 
-  void add_times(Json& record, const BuildPoint& build, const RenderPoint& render, Raycaster& raycaster) {
+  /// The error by cause.
+  Json explain(const Built& built, const Scene& scene, const Picture& reference, const Picture& picture) {
+    const auto truth = analytic_field(experiment_.datasets[loaded_]);
+    const double step = experiment_.reference->step;
+    const Encoding& encoding = find_encoding(built.field.encoding);
+    return split_json(split_error(
+        {*mesh_, encoding, built.request, built.field, *built.gpu, *context_, scene, reference, picture, step, truth.get()}));
+  }
+
+  /// What the level of detail did: the picture against that of the same structure without it.
+  Json pruning_error(const Built& built, Scene scene, const Picture& pruned) const {
+    scene.settings.level_of_detail.reset();
+    scene.settings.max_level.reset();
+    const auto whole = make_consumer(*context_, *mesh_, built.field, *built.gpu, scene);
+    whole->draw();
+    const ErrorMetrics error = compare(pruned, whole->read());
+    return {{"rmse", error.rmse}, {"max", error.max}};
+  }
+
+  void add_times(Json& record, const BuildPoint& build, const RenderPoint& render, Consumer& consumer) {
     std::vector<FrameTime> frames;
     double before = 0;
     double after = 0;
-    Raycaster* baseline = baseline_for(build, render);
+    Consumer* baseline = baseline_for(build, render);
     for (int tries = 0; tries < kTimingTries; ++tries) {
       before = baseline_ms(baseline);
-      frames = time_frames(raycaster, render.warm_up, render.frames);
+      frames = time_frames(consumer, render.warm_up, render.frames);
       after = baseline_ms(baseline);
       if (baseline == nullptr || std::abs(after - before) <= kBaselineDrift * std::min(before, after)) break;
     }
@@ -253,7 +284,7 @@ class Runner {
     record["frame"] = frame;
   }
 
-  double baseline_ms(Raycaster* baseline) {
+  double baseline_ms(Consumer* baseline) {
     if (baseline == nullptr) return 0;
     std::vector<double> wall;
     for (const FrameTime& f : time_frames(*baseline, 1, kBaselineFrames)) wall.push_back(f.wall_ms);
@@ -261,7 +292,7 @@ class Runner {
   }
 
   /// The experiment's first build with its first render settings, for the same view, when it asks for one.
-  Raycaster* baseline_for(const BuildPoint& build, const RenderPoint& render) {
+  Consumer* baseline_for(const BuildPoint& build, const RenderPoint& render) {
     if (!experiment_.baseline) return nullptr;
     const BuildPoint* first = nullptr;
     for (const BuildPoint& b : experiment_.builds)
@@ -272,13 +303,12 @@ class Runner {
     settings.transfer_function = render.transfer_function;
     settings.transfer_function_name = render.transfer_function_name;
     const std::string key = render_json(settings).dump();
-    if (!baseline_) baseline_ = make(*first, settings.settings);
-    if (!baseline_caster_ || key != baseline_key_) {
-      baseline_caster_ =
-          std::make_unique<Raycaster>(*context_, *mesh_, baseline_->field, *baseline_->gpu, scene_of(experiment_, settings));
+    if (!baseline_) baseline_ = make(*first, scene_of(experiment_, settings));
+    if (!baseline_consumer_ || key != baseline_key_) {
+      baseline_consumer_ = make_consumer(*context_, *mesh_, baseline_->field, *baseline_->gpu, scene_of(experiment_, settings));
       baseline_key_ = key;
     }
-    return baseline_caster_.get();
+    return baseline_consumer_.get();
   }
 
   void describe(Json& record, const BuildPoint& build, const RenderPoint& render, const Built* built) {
@@ -348,7 +378,7 @@ class Runner {
   std::size_t loaded_ = 0;
   std::string mesh_hash_;
   std::unique_ptr<Built> baseline_;
-  std::unique_ptr<Raycaster> baseline_caster_;
+  std::unique_ptr<Consumer> baseline_consumer_;
   std::string baseline_key_;
 };
 
@@ -365,6 +395,10 @@ AmrHierarchy load_dataset(const Experiment& experiment, const DatasetSource& sou
     }
   }
   return AmrHierarchy(read_mesh(*source.file, fields));
+}
+
+std::unique_ptr<AnalyticField> analytic_field(const DatasetSource& source) {
+  return source.file ? nullptr : make_analytic_field(source.generate);
 }
 
 std::vector<int> more_fields(const AmrHierarchy& hierarchy, const Scene& scene) {
@@ -403,6 +437,10 @@ Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definit
   }
   if (scene.settings.draws_volume() || scene.settings.draws_surfaces())
     key["transfer_function"] = to_json(scene.transfer_function);
+  if (scene.settings.point_light) {
+    key["light"] = light_json(*scene.settings.point_light);
+    key["light"].erase("shadow_step");  // sampling
+  }
   if (scene.region)
     for (const Vec3d& corner : *scene.region) key["region"].push_back({corner.x, corner.y, corner.z});
   key["step"] = step;

@@ -3,12 +3,14 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "bench/experiment.hpp"
 #include "renderers/context.hpp"
-#include "renderers/raycaster.hpp"
+#include "renderers/consumer.hpp"
+#include "structures/synthetic.hpp"
 
 namespace amrtex {
 
@@ -36,6 +38,9 @@ RunSummary run_experiment(const Experiment& experiment, const RunOptions& option
 /// those that some render point colours surfaces by.
 AmrHierarchy load_dataset(const Experiment& experiment, const DatasetSource& source);
 
+/// The field that a generated data set samples; null for a file.
+std::unique_ptr<AnalyticField> analytic_field(const DatasetSource& source);
+
 /// Fields beside the drawn one that the scene fetches. Throws UsageError naming the fields there are.
 std::vector<int> more_fields(const AmrHierarchy& hierarchy, const Scene& scene);
 
@@ -48,6 +53,6 @@ Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definit
                          const std::filesystem::path& folder, std::string& hash);
 
 /// Frame times through Google Benchmark with manual time: `warm_up` frames are dropped.
-std::vector<FrameTime> time_frames(Raycaster& raycaster, int warm_up, int frames);
+std::vector<FrameTime> time_frames(Consumer& consumer, int warm_up, int frames);
 
 }  // namespace amrtex

@@ -14,15 +14,15 @@ class Silent final : public benchmark::BenchmarkReporter {
 
 }  // namespace
 
-std::vector<FrameTime> time_frames(Raycaster& raycaster, int warm_up, int frames) {
+std::vector<FrameTime> time_frames(Consumer& consumer, int warm_up, int frames) {
   std::vector<FrameTime> times;
-  for (int i = 0; i < warm_up; ++i) raycaster.draw();
+  for (int i = 0; i < warm_up; ++i) consumer.draw();
   if (frames <= 0) return times;
   benchmark::ClearRegisteredBenchmarks();
   benchmark::RegisterBenchmark("frame",
                                [&](benchmark::State& state) {
                                  for (auto _ : state) {
-                                   times.push_back(raycaster.draw());
+                                   times.push_back(consumer.draw());
                                    state.SetIterationTime(times.back().wall_ms / 1000);
                                  }
                                })

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <limits>
 #include <utility>
 
 #include "structures/error.hpp"
@@ -103,6 +104,12 @@ std::string driver_environment() {
   return fmt::format("{}", fmt::join(set, " "));
 }
 
+/// GL has no query for it. Mesa's zink keeps a table of 1024 (its first stays empty) and crashes beyond; of other
+/// drivers no limit is known.
+std::int64_t max_resident_handles(std::string_view renderer) {
+  return renderer.starts_with("zink") ? 1023 : std::numeric_limits<std::int64_t>::max();
+}
+
 void read_limits(const GladGLContext& gl, GlContextInfo& info) {
   info.max_3d_texture_size = get_int(gl, GL_MAX_3D_TEXTURE_SIZE);
   info.max_buffer_bytes = get_int64(gl, GL_MAX_SHADER_STORAGE_BLOCK_SIZE);
@@ -129,6 +136,9 @@ GlContextInfo read_info(const GladGLContext& gl, ContextKind kind) {
   info.bindless_texture = info.has_extension("GL_ARB_bindless_texture");
   info.sparse_texture = info.has_extension("GL_ARB_sparse_texture");
   info.shader_ballot = info.has_extension("GL_ARB_shader_ballot");
+  // the extension asks for one handle in all invocations that run together; NVIDIA's hardware does not
+  info.handles_may_differ = info.vendor.starts_with("NVIDIA");
+  info.max_resident_handles = max_resident_handles(info.renderer);
   read_limits(gl, info);
   info.free_memory_bytes = get_free_memory(gl, info);
   return info;
@@ -214,6 +224,13 @@ void Context::check(std::string_view what) {
     problems.emplace_back(gl_error_name(error));
   }
   if (!problems.empty()) throw Error(fmt::format("context {}, {}: {}", info_.kind, what, fmt::join(problems, "; ")));
+}
+
+void Context::reserve_handles(std::int64_t count) {
+  if (count > info_.max_resident_handles - resident_handles_)
+    throw UnsupportedError(fmt::format("{} handles of textures beside {} in use, the context takes {}", count, resident_handles_,
+                                       info_.max_resident_handles));
+  resident_handles_ += count;
 }
 
 std::vector<std::string> Context::take_messages() { return log_->take_messages(); }

@@ -38,7 +38,6 @@ struct GlContextInfo : ContextInfo {
   std::int64_t free_memory_bytes = 0;  ///< as the driver reports it; 0 = no memory query
   bool software = false;               ///< a software rasteriser: its times stand in no table with a GPU's
   bool sparse_texture = false;
-  bool shader_ballot = false;
   bool has_extension(std::string_view name) const;
 };
 
@@ -64,6 +63,10 @@ class Context {
   /// Messages that were not fatal, oldest first.
   std::vector<std::string> take_messages();
 
+  /// Counts handles of textures against the context's limit. Throws UnsupportedError with the numbers.
+  void reserve_handles(std::int64_t count);
+  void release_handles(std::int64_t count) { resident_handles_ -= count; }
+
  protected:
   using LoadFunction = void (*(*)(const char*))();
 
@@ -78,6 +81,7 @@ class Context {
   std::unique_ptr<GladGLContext> gl_;
   std::unique_ptr<MessageLog> log_;  // its address is known to the driver
   GlContextInfo info_;
+  std::int64_t resident_handles_ = 0;
 };
 
 /// Throws Error that says why not, and which kinds this machine may try.

@@ -130,6 +130,8 @@ Json to_json(const GlContextInfo& info) {
           {"bindless_texture", info.bindless_texture},
           {"sparse_texture", info.sparse_texture},
           {"shader_ballot", info.shader_ballot},
+          {"handles_may_differ", info.handles_may_differ},
+          {"max_resident_handles", info.has_handle_limit() ? Json(info.max_resident_handles) : Json(nullptr)},
           {"max_3d_texture_size", info.max_3d_texture_size},
           {"max_buffer_bytes", info.max_buffer_bytes},
           {"max_texture_units", info.max_texture_units},
@@ -155,6 +157,8 @@ GlContextInfo context_info_from_json(const Json& json) {
   read("bindless_texture", info.bindless_texture);
   read("sparse_texture", info.sparse_texture);
   read("shader_ballot", info.shader_ballot);
+  read("handles_may_differ", info.handles_may_differ);
+  if (!json.at("max_resident_handles").is_null()) read("max_resident_handles", info.max_resident_handles);
   read("max_3d_texture_size", info.max_3d_texture_size);
   read("max_buffer_bytes", info.max_buffer_bytes);
   read("max_texture_units", info.max_texture_units);

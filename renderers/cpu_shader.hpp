@@ -41,6 +41,9 @@ class CpuShader final : public CpuField {
     return {static_cast<double>(c.x), static_cast<double>(c.y), static_cast<double>(c.z), static_cast<double>(c.w)};
   }
 
+  /// For what is no define, uniform or texture; before the first ray.
+  Shader& shader() { return shader_; }
+
  private:
   // GLSL knows no const functions; none of its functions writes to a uniform
   Shader& text() const { return const_cast<Shader&>(shader_); }

@@ -28,25 +28,29 @@ void flip_rows(std::vector<T>& values, int height) {
 
 }  // namespace
 
-DrawTarget::DrawTarget(Context& context, int width, int height, bool counters)
+DrawTarget::DrawTarget(Context& context, int width, int height, bool counters, ColorFormat format, bool stencil)
     : context_(&context), width_(width), height_(height) {
   const GlContextInfo& info = context.info();
   if (width < 1 || height < 1 || width > info.max_viewport_width || height > info.max_viewport_height)
     throw UnsupportedError(fmt::format("a picture of {} x {} pixels; the context takes 1 x 1 to {} x {}", width, height,
                                        info.max_viewport_width, info.max_viewport_height));
-  color_ = make_layer(context, GL_RGBA32F, width, height);
+  color_ = make_layer(context, format == ColorFormat::rgba32f ? GL_RGBA32F : GL_RGBA8, width, height);
   if (counters) counters_ = make_layer(context, GL_RGBA32UI, width, height);
   framebuffer_ = make_framebuffer(context);
   no_vertices_ = make_vertex_array(context);
   const GladGLContext& gl = context.gl();
   gl.NamedFramebufferTexture(framebuffer_.id(), GL_COLOR_ATTACHMENT0, color_.id(), 0);
   if (counters) gl.NamedFramebufferTexture(framebuffer_.id(), GL_COLOR_ATTACHMENT1, counters_.id(), 0);
+  if (stencil) {
+    stencil_ = make_layer(context, GL_DEPTH24_STENCIL8, width, height);
+    gl.NamedFramebufferTexture(framebuffer_.id(), GL_DEPTH_STENCIL_ATTACHMENT, stencil_.id(), 0);
+  }
   const std::array<GLenum, 2> buffers{GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
   gl.NamedFramebufferDrawBuffers(framebuffer_.id(), counters ? 2 : 1, buffers.data());
   const GLenum status = gl.CheckNamedFramebufferStatus(framebuffer_.id(), GL_DRAW_FRAMEBUFFER);
   if (status != GL_FRAMEBUFFER_COMPLETE)
-    throw Error(fmt::format("float framebuffer of {} x {}: status 0x{:04x}", width, height, status));
-  context.check("making a float framebuffer");
+    throw Error(fmt::format("framebuffer of {} x {}: status 0x{:04x}", width, height, status));
+  context.check("making a framebuffer");
 }
 
 void DrawTarget::bind() const {
@@ -55,12 +59,17 @@ void DrawTarget::bind() const {
   context_->gl().Viewport(0, 0, width_, height_);
 }
 
-void DrawTarget::clear() const {
+void DrawTarget::clear(const glm::vec4& color) const {
   context_->make_current();
-  const std::array<GLfloat, 4> black{};
   const std::array<GLuint, 4> zero{};
-  context_->gl().ClearNamedFramebufferfv(framebuffer_.id(), GL_COLOR, 0, black.data());
+  context_->gl().ClearNamedFramebufferfv(framebuffer_.id(), GL_COLOR, 0, &color.x);
   if (counters_) context_->gl().ClearNamedFramebufferuiv(framebuffer_.id(), GL_COLOR, 1, zero.data());
+}
+
+void DrawTarget::clear_stencil() const {
+  context_->make_current();
+  const GLint zero = 0;
+  context_->gl().ClearNamedFramebufferiv(framebuffer_.id(), GL_STENCIL, 0, &zero);
 }
 
 void DrawTarget::draw(const Program& program) const {

@@ -1,4 +1,4 @@
-// Where pictures are drawn: 32-bit floats, and the shader's own counters beside them.
+// Where pictures are drawn: 32-bit floats, and the shader's own counters beside them; 8 bits as the control of an experiment.
 #pragma once
 
 #include <vector>
@@ -9,15 +9,20 @@
 
 namespace amrtex {
 
-/// A framebuffer with RGBA32F at location 0 and, with counters, RGBA32UI at location 1.
+enum class ColorFormat { rgba32f, rgba8 };
+
+/// A framebuffer with RGBA32F (or RGBA8) at location 0 and, with counters, RGBA32UI at location 1.
 class DrawTarget {
  public:
   /// Sizes in pixels; throws UnsupportedError beyond the context's largest viewport.
-  DrawTarget(Context& context, int width, int height, bool counters = false);
+  DrawTarget(Context& context, int width, int height, bool counters = false, ColorFormat format = ColorFormat::rgba32f,
+             bool stencil = false);
 
   /// Makes it the target of draws, its viewport the whole picture.
   void bind() const;
-  void clear() const;
+  void clear(const glm::vec4& color = glm::vec4(0)) const;
+  /// Sets all of the stencil buffer to 0.
+  void clear_stencil() const;
   /// Binds, uses the program and draws the one triangle of fullscreen.vert.
   void draw(const Program& program) const;
 
@@ -35,6 +40,7 @@ class DrawTarget {
   int height_;
   GlTexture color_;
   GlTexture counters_;
+  GlTexture stencil_;
   GlFramebuffer framebuffer_;
   GlVertexArray no_vertices_;
 };

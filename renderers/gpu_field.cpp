@@ -47,6 +47,8 @@ void check_contents(const HostTexture& host) {
     throw Error(fmt::format("'{}': its roles sum to {} bytes, it has {}", host.name, host.roles.total(), host.bytes()));
   if (host.hardware_linear && (host.kind == HostTexture::Kind::buffer || gl_format(host).integer))
     throw Error(fmt::format("'{}': integers and buffers have no hardware filter", host.name));
+  if (!host.handles.empty() && host.kind == HostTexture::Kind::buffer)
+    throw Error(fmt::format("'{}': buffers have no handles", host.name));
 }
 
 /// Asks whether a texture of that size and format would be taken, without making it.
@@ -77,15 +79,39 @@ void check_count(std::string_view what, std::int64_t count, int limit) {
   if (count > limit) throw UnsupportedError(fmt::format("{} {}, the context takes {}", count, what, limit));
 }
 
+bool has_handle(const HostTexture& host) { return !host.handles.empty(); }
+
+/// Each element of a buffer of handles belongs to one texture.
+void check_handles(const EncodedField& field) {
+  std::map<std::string, std::vector<int>, std::less<>> uses;
+  for (const HostTexture& host : field.textures) {
+    if (!has_handle(host)) continue;
+    const HostTexture* buffer = field.find(host.handles);
+    if (buffer == nullptr || buffer->kind != HostTexture::Kind::buffer || buffer->format != TexelFormat::rg32ui)
+      throw Error(fmt::format("'{}': there is no buffer '{}' of rg32ui for its handle", host.name, host.handles));
+    std::vector<int>& count = uses[host.handles];
+    count.resize(static_cast<std::size_t>(buffer->texels()));
+    if (host.handle_index < 0 || host.handle_index >= buffer->texels() ||
+        ++count[static_cast<std::size_t>(host.handle_index)] > 1)
+      throw Error(fmt::format("'{}': element {} of '{}' is taken or not one of {}", host.name, host.handle_index, host.handles,
+                              buffer->texels()));
+  }
+  for (const auto& [name, count] : uses)
+    if (std::find(count.begin(), count.end(), 0) != count.end())
+      throw Error(fmt::format("'{}': an element has no texture", name));
+}
+
 void check_field(const EncodedField& field, Context& context) {
   const auto is_buffer = [](const HostTexture& t) { return t.kind == HostTexture::Kind::buffer; };
   const auto buffers = std::count_if(field.textures.begin(), field.textures.end(), is_buffer);
+  const auto handles = std::count_if(field.textures.begin(), field.textures.end(), has_handle);
   check_count("storage buffers", buffers, context.info().max_storage_bindings);
-  check_count("textures", std::ssize(field.textures) - buffers, context.info().max_texture_units);
+  check_count("textures", std::ssize(field.textures) - buffers - handles, context.info().max_texture_units);
   for (const HostTexture& host : field.textures) {
     check_contents(host);
     is_buffer(host) ? check_buffer_limits(host, context) : check_texture_limits(host, context);
   }
+  check_handles(field);
 }
 
 void set_sampling(const GladGLContext& gl, GLuint id, bool linear) {
@@ -123,8 +149,16 @@ GpuField::GpuField(const EncodedField& field, Context& context)
   context.make_current();
   try {
     check_field(field, context);
-    for (const HostTexture& host : field.textures)
-      host.kind == HostTexture::Kind::buffer ? upload_buffer(host) : upload_texture(host);
+    const Handles handles = upload_set(field);
+    for (const HostTexture& host : field.textures) {
+      if (has_handle(host)) continue;
+      if (host.kind != HostTexture::Kind::buffer) {
+        textures_.push_back({host.name, upload_texture(host)});
+        continue;
+      }
+      const auto words = handles.find(host.name);
+      upload_buffer(host, words == handles.end() ? host.data.data() : reinterpret_cast<const std::byte*>(words->second.data()));
+    }
   } catch (const UnsupportedError& e) {
     throw UnsupportedError(fmt::format("encoding {}: {}", encoding_, e.what()));
   } catch (const Error& e) {
@@ -135,7 +169,21 @@ GpuField::GpuField(const EncodedField& field, Context& context)
         fmt::format("encoding {}: {} bytes were allocated, its ledger has {}", encoding_, bytes_, field.memory().total()));
 }
 
-void GpuField::upload_texture(const HostTexture& host) {
+GpuField::Handles GpuField::upload_set(const EncodedField& field) {
+  Handles handles;
+  resident_ = ResidentTextures(*context_, std::count_if(field.textures.begin(), field.textures.end(), has_handle));
+  for (const HostTexture& host : field.textures) {
+    if (!has_handle(host)) continue;
+    const std::uint64_t handle = resident_.add(upload_texture(host));
+    std::vector<std::uint32_t>& words = handles[host.handles];
+    words.resize(2 * static_cast<std::size_t>(field.find(host.handles)->texels()));
+    words[2 * static_cast<std::size_t>(host.handle_index)] = static_cast<std::uint32_t>(handle);
+    words[2 * static_cast<std::size_t>(host.handle_index) + 1] = static_cast<std::uint32_t>(handle >> 32);
+  }
+  return handles;
+}
+
+GlTexture GpuField::upload_texture(const HostTexture& host) {
   const GladGLContext& gl = context_->gl();
   const GlFormat& f = gl_format(host);
   GlTexture texture = make_texture(*context_, GL_TEXTURE_3D);
@@ -144,17 +192,17 @@ void GpuField::upload_texture(const HostTexture& host) {
   fill_texture(gl, texture.id(), host);
   context_->check(fmt::format("uploading texture '{}' of {} texels", host.name, size_text(host.size)));
   bytes_ += std::int64_t{host.size.x} * host.size.y * host.size.z * f.bytes;
-  textures_.push_back({host.name, std::move(texture)});
+  return texture;
 }
 
-void GpuField::upload_buffer(const HostTexture& host) {
+void GpuField::upload_buffer(const HostTexture& host, const std::byte* data) {
   const GladGLContext& gl = context_->gl();
   gl_format(host);  // refuses formats of the CPU
   GlBuffer buffer = make_buffer(*context_);
   const std::int64_t total = host.bytes();
   gl.NamedBufferStorage(buffer.id(), total, nullptr, GL_DYNAMIC_STORAGE_BIT);
   for (std::int64_t start = 0; start < total; start += kMaxBytesPerCall)
-    gl.NamedBufferSubData(buffer.id(), start, std::min(kMaxBytesPerCall, total - start), host.data.data() + start);
+    gl.NamedBufferSubData(buffer.id(), start, std::min(kMaxBytesPerCall, total - start), data + start);
   context_->check(fmt::format("uploading buffer '{}' of {} bytes", host.name, total));
   bytes_ += total;
   buffers_.push_back({host.name, host.name + "_block", std::move(buffer)});
@@ -185,6 +233,7 @@ std::int64_t GpuField::bytes_reported() const {
   const GladGLContext& gl = context_->gl();
   std::int64_t sum = 0;
   for (const Texture& t : textures_) sum += reported_texture_bytes(gl, t.object.id());
+  for (const GlTexture& t : resident_.textures()) sum += reported_texture_bytes(gl, t.id());
   for (const Buffer& b : buffers_) {
     GLint64 size = 0;
     gl.GetNamedBufferParameteri64v(b.object.id(), GL_BUFFER_SIZE, &size);

@@ -2,17 +2,19 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
 #include "renderers/gl_objects.hpp"
 #include "renderers/program.hpp"
+#include "renderers/resident_textures.hpp"
 #include "structures/encoding.hpp"
 
 namespace amrtex {
 
-/// The GL objects of one field. A texture is bound to the sampler of its name, a
-/// buffer to the storage block `<name>_block`.
+/// The GL objects of one field. A texture is bound to the sampler of its name, or reached by its
+/// handle; a buffer is bound to the storage block `<name>_block`.
 class GpuField {
  public:
   /// Throws UnsupportedError with the numbers, before anything is allocated, where a
@@ -36,20 +38,24 @@ class GpuField {
     std::string name;
     GlTexture object;
   };
+  /// Handles by the buffer that receives them; two words an element.
+  using Handles = std::map<std::string, std::vector<std::uint32_t>, std::less<>>;
   struct Buffer {
     std::string name;
     std::string block;
     GlBuffer object;
   };
 
-  void upload_texture(const HostTexture& host);
-  void upload_buffer(const HostTexture& host);
+  GlTexture upload_texture(const HostTexture& host);
+  Handles upload_set(const EncodedField& field);
+  void upload_buffer(const HostTexture& host, const std::byte* data);
 
   Context* context_;
   std::string encoding_;
   std::vector<std::pair<std::string, Vec3i>> integer_uniforms_;
   std::vector<Texture> textures_;
   std::vector<Buffer> buffers_;
+  ResidentTextures resident_;
   std::int64_t bytes_ = 0;
 };
 

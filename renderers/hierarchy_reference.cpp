@@ -6,11 +6,13 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include <array>
 #include <cmath>
 #include <map>
 #include <mutex>
 
 #include "renderers/reference_field.hpp"
+#include "renderers/reference_light.hpp"
 #include "renderers/reference_point.hpp"
 #include "renderers/reference_surface.hpp"
 #include "renderers/reference_tracer.hpp"
@@ -29,13 +31,15 @@ struct Drawing {
   Mode mode;
   double part;  // world length of the largest part
   const TransferTable* table;
+  const AnalyticField* truth;  // drawn instead of the field, where it is not null
 };
 
 Vec3d to_index(const AmrHierarchy& h, const Vec3d& p_world) {
   return (p_world - h.domain_lower()) * Vec3d(h.cells(h.finest_level())) / (h.domain_upper() - h.domain_lower());
 }
 
-Drawing make_drawing(const AmrHierarchy& h, const Scene& scene, double step, const TransferTable* table) {
+Drawing make_drawing(const AmrHierarchy& h, const Scene& scene, double step, const TransferTable* table,
+                     const AnalyticField* truth) {
   const Vec3d domain(h.cells(h.finest_level()));
   const Vec3d spacing = h.spacing(h.finest_level());
   Drawing d{camera_frame(scene.view, scene.settings.width, scene.settings.height),
@@ -45,7 +49,8 @@ Drawing make_drawing(const AmrHierarchy& h, const Scene& scene, double step, con
             domain / (h.domain_upper() - h.domain_lower()),
             scene.settings.mode,
             step * std::min({spacing.x, spacing.y, spacing.z}),
-            table};
+            table,
+            truth};
   if (scene.region) {
     d.lower = glm::max(d.lower, to_index(h, (*scene.region)[0]));
     d.upper = glm::min(d.upper, to_index(h, (*scene.region)[1]));
@@ -74,28 +79,77 @@ std::optional<Span> stretch_in(const IndexRay& ray, const Vec3d& lower, const Ve
   return span;
 }
 
-void draw_light(ReferenceTracer& tracer, const IndexRay& ray, double end, const Drawing& drawing, double* pixel) {
-  LightIntegral light(*drawing.table);
-  tracer.trace(ray, end, [&](const PieceFunction& f, double from, double to) {
-    light.add(f, to - from, drawing.part);
+/// The cubic through the values at 0, 1/3, 2/3 and 1 of a piece.
+PieceFunction cubic_through(const std::array<double, 4>& v) {
+  PieceFunction f;
+  const double d1 = v[1] - v[0], d2 = v[2] - v[0], d3 = v[3] - v[0];
+  f.numerator.c = {v[0], 9 * d1 - 4.5 * d2 + d3, -22.5 * d1 + 18 * d2 - 4.5 * d3, 13.5 * d1 - 13.5 * d2 + 4.5 * d3};
+  f.denominator.c[0] = 1;
+  f.upper = maximum(f);
+  PieceFunction below = f;
+  for (double& c : below.numerator.c) c = -c;
+  f.lower = -maximum(below);
+  return f;
+}
+
+/// A ray through an analytic field, its pieces those of the mesh in parts of at most `part`.
+class AnalyticRay {
+ public:
+  AnalyticRay(const Drawing& drawing, const IndexRay& ray) : drawing_(drawing), ray_(ray) {}
+
+  template <class Visit>
+  bool visit_parts(double from, double to, Visit&& visit) const {
+    const auto count = static_cast<int>(std::max(std::ceil((to - from) / drawing_.part), 1.0));
+    const double length = (to - from) / count;
+    for (int i = 0; i < count; ++i) {
+      std::array<double, 4> values{};
+      for (std::size_t k = 0; k < 4; ++k) values[k] = value(from + length * (i + static_cast<double>(k) / 3));
+      if (!visit(cubic_through(values), from + length * i, from + length * (i + 1))) return false;
+    }
+    return true;
+  }
+
+ private:
+  double value(double t) const {
+    return drawing_.truth->value(drawing_.domain_lower + (ray_.origin + t * ray_.direction) / drawing_.cells_a_length);
+  }
+
+  const Drawing& drawing_;
+  const IndexRay& ray_;
+};
+
+/// Pieces of the field, or of the analytic one in its place.
+template <class Visit>
+void trace(ReferenceTracer& tracer, const IndexRay& ray, double end, const Drawing& drawing, Visit&& visit) {
+  if (drawing.truth == nullptr) return tracer.trace(ray, end, visit);
+  const AnalyticRay analytic(drawing, ray);
+  tracer.trace(ray, end, [&](const PieceFunction&, double from, double to) { return analytic.visit_parts(from, to, visit); });
+}
+
+void draw_light(ReferenceTracer& tracer, const IndexRay& ray, double end, const Drawing& drawing, LightIntegral::Arriving lamp,
+                double* pixel) {
+  LightIntegral light(*drawing.table, std::move(lamp));
+  trace(tracer, ray, end, drawing, [&](const PieceFunction& f, double from, double to) {
+    light.add(f, to - from, drawing.part, 0, 1, from);
     return light.transmittance() >= LightIntegral::kOpaque;
   });
   for (int c = 0; c < 3; ++c) pixel[c] = light.color()[c];
   pixel[3] = 1 - light.transmittance();
 }
 
-double line_integral(ReferenceTracer& tracer, const IndexRay& ray, double end, double part) {
+double line_integral(ReferenceTracer& tracer, const IndexRay& ray, double end, const Drawing& drawing) {
+  const double part = drawing.part;
   double sum = 0;
-  tracer.trace(ray, end, [&](const PieceFunction& f, double from, double to) {
+  trace(tracer, ray, end, drawing, [&](const PieceFunction& f, double from, double to) {
     sum += (to - from) * mean(f, static_cast<int>(std::clamp(std::ceil((to - from) / part), 1.0, 16.0)));
     return true;
   });
   return sum;
 }
 
-double line_maximum(ReferenceTracer& tracer, const IndexRay& ray, double end) {
+double line_maximum(ReferenceTracer& tracer, const IndexRay& ray, double end, const Drawing& drawing) {
   double best = -std::numeric_limits<double>::infinity();
-  tracer.trace(ray, end, [&](const PieceFunction& f, double, double) {
+  trace(tracer, ray, end, drawing, [&](const PieceFunction& f, double, double) {
     if (f.upper > best) best = std::max(best, maximum(f));
     return true;
   });
@@ -106,7 +160,14 @@ double line_maximum(ReferenceTracer& tracer, const IndexRay& ray, double end) {
 struct Worker {
   ReferenceTracer tracer;
   std::optional<SurfacePainter> painter;  // where there are surfaces
+  std::optional<LampTracer> lamp;         // where there is one
 };
+
+/// Light of the lamp along a ray; empty where there is no lamp.
+LightIntegral::Arriving arriving_light(Worker& worker, const IndexRay& ray) {
+  if (!worker.lamp) return {};
+  return [&lamp = *worker.lamp, &ray](double t) { return lamp.light_at(ray.origin + t * ray.direction); };
+}
 
 void draw_pixel(Worker& worker, const Drawing& drawing, int x, int y, Picture& picture) {
   const WorldRay world = camera_ray(drawing.camera, x, y, picture.width, picture.height);
@@ -118,17 +179,17 @@ void draw_pixel(Worker& worker, const Drawing& drawing, int x, int y, Picture& p
   double* pixel = picture.pixel(x, y);
   switch (drawing.mode) {
     case Mode::dvr:
-      draw_light(worker.tracer, ray, end, drawing, pixel);
+      draw_light(worker.tracer, ray, end, drawing, arriving_light(worker, ray), pixel);
       break;
     case Mode::projection:
-      *pixel = line_integral(worker.tracer, ray, end, drawing.part);
+      *pixel = line_integral(worker.tracer, ray, end, drawing);
       break;
     case Mode::mip:
-      *pixel = line_maximum(worker.tracer, ray, end);
+      *pixel = line_maximum(worker.tracer, ray, end, drawing);
       break;
     case Mode::iso:
     case Mode::dvr_iso:
-      worker.painter->draw(worker.tracer, ray, world.direction, span->from, end, pixel);
+      worker.painter->draw(worker.tracer, ray, world.direction, span->from, end, arriving_light(worker, ray), pixel);
       break;
   }
 }
@@ -139,6 +200,7 @@ void check(const Scene& scene, double step) {
     throw Error(fmt::format("picture of {} x {} pixels: both must be at least 1", scene.settings.width, scene.settings.height));
   if (scene.settings.draws_volume()) validate(scene.transfer_function);
   if (scene.settings.draws_surfaces()) validate(scene.settings.isosurfaces);
+  validate_light(scene.settings);
 }
 
 double extinction_scale(const AmrHierarchy& h, const TransferFunction& tf) {
@@ -159,6 +221,7 @@ struct HierarchyReference::Data {
   ReferenceField field;
   std::mutex mutex;
   std::map<int, ReferenceField> color_fields;  // made when a scene first asks for them
+  tbb::enumerable_thread_specific<VertexCache> vertices;
 
   const ReferenceField* color_field(const Scene& scene);
 };
@@ -175,30 +238,46 @@ const ReferenceField* HierarchyReference::Data::color_field(const Scene& scene) 
 }
 
 HierarchyReference::HierarchyReference(const AmrHierarchy& hierarchy, int field, FilterDefinition definition)
-    : data_(new Data{ReferenceField(hierarchy, field, definition), {}, {}}) {}
+    : data_(new Data{ReferenceField(hierarchy, field, definition), {}, {}, {}}) {}
 HierarchyReference::~HierarchyReference() = default;
 
-std::optional<double> HierarchyReference::sample(const FinestPosition& p) const { return value_at(data_->field, p, nullptr); }
+std::optional<double> HierarchyReference::sample(const FinestPosition& p) const {
+  const bool vertices = data_->field.definition().filter == Filter::linear_vertex;  // the one filter that keeps any
+  return value_at(data_->field, p, vertices ? &data_->vertices.local() : nullptr);
+}
 
 std::optional<double> HierarchyReference::sample(const Vec3d& p_world) const {
   const auto p = finest_position(data_->field.hierarchy(), p_world);
   return p ? sample(*p) : std::nullopt;
 }
 
-Picture HierarchyReference::render(const Scene& scene, double step) const {
+Picture HierarchyReference::render(const Scene& scene, double step) const { return draw(scene, step, nullptr); }
+
+Picture HierarchyReference::render(const Scene& scene, double step, const AnalyticField& truth) const {
+  if (scene.settings.draws_surfaces())
+    throw UsageError(
+        fmt::format("mode {}: an analytic field is drawn in the modes dvr, projection and mip", mode_name(scene.settings.mode)));
+  return draw(scene, step, &truth);
+}
+
+Picture HierarchyReference::draw(const Scene& scene, double step, const AnalyticField* truth) const {
   check(scene, step);
   const AmrHierarchy& h = data_->field.hierarchy();
   const ReferenceField* color_field = data_->color_field(scene);
   std::optional<TransferTable> table;
   if (scene.settings.draws_volume()) table.emplace(scene.transfer_function, extinction_scale(h, scene.transfer_function));
-  const Drawing drawing = make_drawing(h, scene, step, table ? &*table : nullptr);
+  const Drawing drawing = make_drawing(h, scene, step, table ? &*table : nullptr, truth);
   std::optional<SurfaceScene> surfaces;
   if (scene.settings.draws_surfaces()) surfaces.emplace(scene, data_->field, color_field, drawing.table, drawing.part);
+  std::optional<LampScene> lamp;
+  if (scene.settings.point_light)
+    lamp.emplace(scene, data_->field, extinction_scale(h, scene.transfer_function), drawing.lower, drawing.upper, drawing.part);
   Picture picture(scene.settings.width, scene.settings.height, scene.settings.picture_channels());
   const int columns = ceil_div(picture.width, kTile);
   tbb::enumerable_thread_specific<Worker> workers([&] {
-    Worker worker{ReferenceTracer(data_->field), std::nullopt};
+    Worker worker{ReferenceTracer(data_->field), std::nullopt, std::nullopt};
     if (surfaces) worker.painter.emplace(*surfaces);
+    if (lamp) worker.lamp.emplace(*lamp);
     return worker;
   });
   tbb::parallel_for(0, columns * ceil_div(picture.height, kTile), [&](int tile) {

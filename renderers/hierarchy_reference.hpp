@@ -9,6 +9,7 @@
 #include "renderers/picture.hpp"
 #include "renderers/scene.hpp"
 #include "structures/amr_hierarchy.hpp"
+#include "structures/synthetic.hpp"
 
 namespace amrtex {
 
@@ -38,7 +39,14 @@ class HierarchyReference {
   /// sampling, skip, early_end and tolerance.
   Picture render(const Scene& scene, double step) const;
 
+  /// The same picture of `truth` instead of the field, where the mesh has values: what the filter and the mesh do to a field is
+  /// the difference of both. On each part of a ray `truth` is the cubic through four of its values, so the error is of order 4
+  /// in `step` where it is smooth. Modes dvr, projection and mip; throws UsageError for others.
+  Picture render(const Scene& scene, double step, const AnalyticField& truth) const;
+
  private:
+  Picture draw(const Scene& scene, double step, const AnalyticField* truth) const;
+
   struct Data;
   std::unique_ptr<Data> data_;
 };

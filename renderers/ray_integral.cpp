@@ -137,8 +137,9 @@ TransferTable::Light TransferTable::light(const Segment& segment, double value) 
   return {segment.lower.extinction + w * rise, segment.lower.rgb + w * (segment.upper.rgb - segment.lower.rgb)};
 }
 
-void LightIntegral::add(const PieceFunction& f, double length, double max_part, double from, double to) {
+void LightIntegral::add(const PieceFunction& f, double length, double max_part, double from, double to, double start) {
   if (table_ == nullptr || !(to > from)) return;
+  start_ = start;
   const std::size_t first = table_->segment_of(f.lower);
   const std::size_t last = table_->segment_of(f.upper);
   if (!table_->visible(first, last)) return;
@@ -169,7 +170,7 @@ void LightIntegral::add_interval(const PieceFunction& f, double from, double to,
   const auto& segment = table_->segment(table_->segment_of(f((from + to) / 2)));
   if (!segment.visible) return;
   // two points integrate a cubic extinction exactly, and of one colour nothing else is needed
-  const bool exact = segment.constant || (segment.one_color && !table_->logarithmic() && !f.rational);
+  const bool exact = !arriving_ && (segment.constant || (segment.one_color && !table_->logarithmic() && !f.rational));
   const double wanted = exact ? 1 : std::ceil((to - from) * length / max_part * (1 - 1e-9));
   const int parts = static_cast<int>(std::clamp(wanted, 1.0, kParts));
   const double width = (to - from) / parts;
@@ -184,8 +185,8 @@ void LightIntegral::add_parts(const PieceFunction& f, const TransferTable::Segme
                               double length, double max_part) {
   if (transmittance_ < kOpaque) return;
   const double offset = width / (2 * kSqrt3);
-  const auto first = table_->light(segment, f(middle - offset));
-  const auto second = table_->light(segment, f(middle + offset));
+  const auto first = light(f, segment, middle - offset, length);
+  const auto second = light(f, segment, middle + offset, length);
   const double depth = (first.extinction + second.extinction) / 2 * (width * length);
   if (width * length > max_part * 1.001 && depth > kThin) {
     add_parts(f, segment, middle - width / 4, width / 2, length, max_part);
@@ -195,8 +196,16 @@ void LightIntegral::add_parts(const PieceFunction& f, const TransferTable::Segme
   add_part(first, second, depth);
 }
 
+/// What a place of the piece emits.
+TransferTable::Light LightIntegral::light(const PieceFunction& f, const TransferTable::Segment& segment, double s,
+                                          double length) const {
+  TransferTable::Light light = table_->light(segment, f(s));
+  if (arriving_ && light.extinction > 0) light.rgb *= arriving_(start_ + s * length);
+  return light;
+}
+
 /// A part of mean extinction K and length h has opacity 1 - exp(-K h); its colour is the mean of
-/// the two points' weighted by what each sends to the front. Exact where the colour is constant.
+/// the two points' weighted by what each sends to the front. Exact where colour and light are constant.
 void LightIntegral::add_part(const TransferTable::Light& first, const TransferTable::Light& second, double depth) {
   if (!(depth > 0)) return;
   const double opacity = -std::expm1(-depth);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <limits>
 #include <vector>
 
@@ -82,12 +83,17 @@ class LightIntegral {
   /// Transmittance behind which nothing is added: far below what a float picture can show.
   static constexpr double kOpaque = 1e-12;
 
+  /// Light that arrives at a place of the ray (its parameter, world length): what is emitted there is multiplied by it.
+  using Arriving = std::function<double(double)>;
+
   LightIntegral() = default;  ///< no volume, surfaces alone
-  explicit LightIntegral(const TransferTable& table) : table_(&table) {}
+  /// Without `arriving` every place has its full light.
+  explicit LightIntegral(const TransferTable& table, Arriving arriving = {}) : table_(&table), arriving_(std::move(arriving)) {}
 
   /// Adds a piece of `length`, or what lies between two of its places, in parts of at most
-  /// `max_part` (both world), or of a 16th of the stretch where these are thin.
-  void add(const PieceFunction& f, double length, double max_part, double from = 0, double to = 1);
+  /// `max_part` (both world), or of a 16th of the stretch where these are thin. `start`: where
+  /// the piece begins, which only `arriving` asks for.
+  void add(const PieceFunction& f, double length, double max_part, double from = 0, double to = 1, double start = 0);
   /// Adds a surface behind all that was added before.
   void add_surface(const Vec3d& rgb, double opacity);
 
@@ -99,8 +105,11 @@ class LightIntegral {
   void add_parts(const PieceFunction& f, const TransferTable::Segment& segment, double middle, double width, double length,
                  double max_part);
   void add_part(const TransferTable::Light& first, const TransferTable::Light& second, double depth);
+  TransferTable::Light light(const PieceFunction& f, const TransferTable::Segment& segment, double s, double length) const;
 
   const TransferTable* table_ = nullptr;
+  Arriving arriving_;
+  double start_ = 0;   // of the piece
   Vec3d color_{0};     // premultiplied
   double depth_ = 0;   // optical, of the volume, from the eye
   double passed_ = 1;  // what surfaces let through

@@ -4,58 +4,27 @@
 
 #include <chrono>
 
-#include "renderers/cpu_field.hpp"
-
 namespace amrtex {
-namespace {
-
-GlBuffer upload(Context& context, const HostTexture& host) {
-  GlBuffer buffer = make_buffer(context);
-  context.gl().NamedBufferStorage(buffer.id(), static_cast<GLsizeiptr>(host.data.size()), host.data.data(), 0);
-  context.check("uploading " + host.name);
-  return buffer;
-}
-
-ShaderKey shader_key(const EncodedField& field, const SceneBindings& bindings, bool counting) {
-  ShaderKey key;
-  key.entry = "raycast.frag";
-  key.use(field.shader);
-  for (const auto& [name, value] : bindings.defines) key.define(name, value);
-  key.define("AMRTEX_COUNT", counting ? 1 : 0);
-  return key;
-}
-
-}  // namespace
 
 Raycaster::Raycaster(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const GpuField& gpu,
                      const Scene& scene)
     : context_(&context),
-      field_(&field),
       gpu_(&gpu),
       scene_(scene),
-      bindings_(bind_scene(hierarchy, field, scene)),
+      resources_(context, hierarchy, field, scene),
       program_(make_program(false)),
       target_(context, scene.settings.width, scene.settings.height),
-      timer_(context) {
-  for (const HostTexture& b : bindings_.buffers) buffers_.push_back(upload(context, b));
-}
+      timer_(context) {}
 
 Program Raycaster::make_program(bool counting) const {
   ShaderKey vertex;
   vertex.entry = "fullscreen.vert";
-  return {*context_, assemble_shader(vertex), assemble_shader(shader_key(*field_, bindings_, counting))};
-}
-
-void Raycaster::bind(Program& program) const {
-  program.use();
-  for (const UniformValue& u : bindings_.uniforms) program.set_optional(u);
-  for (std::size_t i = 0; i < buffers_.size(); ++i) program.bind_buffer(bindings_.buffers[i].name + "_block", buffers_[i].id());
-  gpu_->bind(program);
+  return {*context_, assemble_shader(vertex), assemble_shader(resources_.shader_key("raycast.frag", counting))};
 }
 
 FrameTime Raycaster::draw() {
   context_->make_current();
-  bind(program_);
+  resources_.bind(program_, *gpu_);
   context_->gl().Finish();
   const auto start = std::chrono::steady_clock::now();
   timer_.begin();
@@ -72,7 +41,7 @@ Picture Raycaster::read() const { return target_.read_picture(scene_.settings.pi
 WorkCounts Raycaster::count() {
   Program counting = make_program(true);
   const DrawTarget target(*context_, scene_.settings.width, scene_.settings.height, true);
-  bind(counting);
+  resources_.bind(counting, *gpu_);
   target.clear();
   target.draw(counting);
   WorkCounts counts;
@@ -87,19 +56,23 @@ WorkCounts Raycaster::count() {
 }
 
 Picture render_on_cpu(const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene, bool double_precision) {
-  const SceneBindings bindings = bind_scene(hierarchy, field, scene);
   const auto cpu = make_cpu_field(field.encoding, double_precision ? Precision::double_precision : Precision::single_precision);
+  return trace_on_cpu(*cpu, hierarchy, field, scene);
+}
+
+Picture trace_on_cpu(CpuField& cpu, const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene) {
+  const SceneBindings bindings = bind_scene(hierarchy, field, scene);
   auto defines = bindings.defines;
   defines.insert(defines.end(), field.shader.defines.begin(), field.shader.defines.end());
   std::vector<const HostTexture*> textures;
   for (const HostTexture& t : field.textures) textures.push_back(&t);
   for (const HostTexture& t : bindings.buffers) textures.push_back(&t);
-  cpu->set(defines, bindings.uniforms, textures);
+  cpu.set(defines, bindings.uniforms, textures);
   const RenderSettings& s = scene.settings;
   Picture picture(s.width, s.height, s.picture_channels());
   tbb::parallel_for(0, s.height, [&](int y) {
     for (int x = 0; x < s.width; ++x) {
-      const auto value = cpu->trace(x + 0.5, s.height - y - 0.5);
+      const auto value = cpu.trace(x + 0.5, s.height - y - 0.5);
       std::copy_n(value.begin(), picture.channels, picture.pixel(x, y));
     }
   });

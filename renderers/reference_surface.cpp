@@ -86,8 +86,8 @@ SurfaceScene::SurfaceScene(const Scene& s, const ReferenceField& f, const Refere
 }
 
 void SurfacePainter::draw(ReferenceTracer& tracer, const IndexRay& ray, const Vec3d& direction, double start, double end,
-                          double* pixel) {
-  if (scene_.settings.output == Output::color) return draw_color(tracer, ray, direction, end, pixel);
+                          const LightIntegral::Arriving& lamp, double* pixel) {
+  if (scene_.settings.output == Output::color) return draw_color(tracer, ray, direction, end, lamp, pixel);
   SurfaceFinder finder(scene_.settings.values, kJoint * end);
   tracer.trace(ray, end, [&](const PieceFunction& f, double from, double to) {
     const auto& crossings = finder.next(f, from, to);
@@ -105,20 +105,23 @@ void SurfacePainter::draw(ReferenceTracer& tracer, const IndexRay& ray, const Ve
   });
 }
 
-void SurfacePainter::draw_color(ReferenceTracer& tracer, const IndexRay& ray, const Vec3d& direction, double end, double* pixel) {
+void SurfacePainter::draw_color(ReferenceTracer& tracer, const IndexRay& ray, const Vec3d& direction, double end,
+                                const LightIntegral::Arriving& lamp, double* pixel) {
   const Isosurfaces& surfaces = scene_.settings;
-  LightIntegral light = scene_.volume != nullptr ? LightIntegral(*scene_.volume) : LightIntegral();
+  LightIntegral light = scene_.volume != nullptr ? LightIntegral(*scene_.volume, lamp) : LightIntegral();
   SurfaceFinder finder(surfaces.values, kJoint * end);
   tracer.trace(ray, end, [&](const PieceFunction& f, double from, double to) {
     double behind = 0;  // the last crossing
     for (const Crossing& c : finder.next(f, from, to)) {
-      light.add(f, to - from, scene_.part, behind, c.s);
+      light.add(f, to - from, scene_.part, behind, c.s, from);
       behind = c.s;
       if (light.transmittance() < LightIntegral::kOpaque) return false;
-      const Vec3d p = point_of(tracer, ray, from + c.s * (to - from), c.s);
-      light.add_surface(color_at(p, c.surface, direction), surfaces.opacity.empty() ? 1 : surfaces.opacity[c.surface]);
+      const double t = from + c.s * (to - from);
+      const Vec3d p = point_of(tracer, ray, t, c.s);
+      const Vec3d rgb = color_at(p, c.surface, direction) * (lamp ? lamp(t) : 1.0);
+      light.add_surface(rgb, surfaces.opacity.empty() ? 1 : surfaces.opacity[c.surface]);
     }
-    light.add(f, to - from, scene_.part, behind, 1);
+    light.add(f, to - from, scene_.part, behind, 1, from);
     return light.transmittance() >= LightIntegral::kOpaque;
   });
   for (int c = 0; c < 3; ++c) pixel[c] = light.color()[c];

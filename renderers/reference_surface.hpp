@@ -60,11 +60,13 @@ class SurfacePainter {
  public:
   explicit SurfacePainter(const SurfaceScene& scene) : scene_(scene) {}
 
-  /// `start`: world distance from the eye to t = 0; `direction`: the ray's, world, unit length.
-  void draw(ReferenceTracer& tracer, const IndexRay& ray, const Vec3d& direction, double start, double end, double* pixel);
+  /// `start`: world distance from the eye to t = 0; `direction`: the ray's, world, unit length; `lamp`: see LightIntegral.
+  void draw(ReferenceTracer& tracer, const IndexRay& ray, const Vec3d& direction, double start, double end,
+            const LightIntegral::Arriving& lamp, double* pixel);
 
  private:
-  void draw_color(ReferenceTracer& tracer, const IndexRay& ray, const Vec3d& direction, double end, double* pixel);
+  void draw_color(ReferenceTracer& tracer, const IndexRay& ray, const Vec3d& direction, double end,
+                  const LightIntegral::Arriving& lamp, double* pixel);
   Vec3d color_at(const Vec3d& p, std::size_t surface, const Vec3d& direction);
   Vec3d normal_at(const Vec3d& p);
 

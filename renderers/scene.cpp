@@ -202,7 +202,88 @@ int RenderSettings::picture_channels() const {
   return mode == Mode::dvr ? 4 : 1;
 }
 
+std::string_view consumer_name(ConsumerKind consumer) {
+  switch (consumer) {
+    case ConsumerKind::raycast:
+      return "raycast";
+    case ConsumerKind::multipass:
+      return "multipass";
+    case ConsumerKind::slices:
+      return "slices";
+    case ConsumerKind::stencil_slices:
+      return "stencil_slices";
+  }
+  return "";
+}
+
+std::string_view slice_target_name(SliceTarget target) { return target == SliceTarget::rgba32f ? "rgba32f" : "rgba8"; }
+
+ConsumerKind parse_consumer(std::string_view name) {
+  for (const ConsumerKind kind :
+       {ConsumerKind::raycast, ConsumerKind::multipass, ConsumerKind::slices, ConsumerKind::stencil_slices})
+    if (name == consumer_name(kind)) return kind;
+  throw UsageError(fmt::format("unknown consumer '{}'; accepted are raycast, multipass, slices, stencil_slices", name));
+}
+
+SliceTarget parse_slice_target(std::string_view name) {
+  for (const SliceTarget target : {SliceTarget::rgba32f, SliceTarget::rgba8})
+    if (name == slice_target_name(target)) return target;
+  throw UsageError(fmt::format("unknown slice_target '{}'; accepted are rgba32f, rgba8", name));
+}
+
 std::string_view sampling_name(Sampling sampling) { return sampling == Sampling::lattice ? "lattice" : "adaptive"; }
+
+std::string_view integrator_name(Integrator integrator) {
+  switch (integrator) {
+    case Integrator::exponential_midpoint:
+      return "exponential_midpoint";
+    case Integrator::euler:
+      return "euler";
+    case Integrator::left:
+      return "left";
+    case Integrator::preintegrated:
+      return "preintegrated";
+    case Integrator::tolerance:
+      return "tolerance";
+  }
+  return "";
+}
+
+Integrator parse_integrator(std::string_view name) {
+  if (name == "midpoint") return Integrator::exponential_midpoint;
+  for (const Integrator integrator :
+       {Integrator::exponential_midpoint, Integrator::euler, Integrator::left, Integrator::preintegrated, Integrator::tolerance})
+    if (name == integrator_name(integrator)) return integrator;
+  throw UsageError(fmt::format(
+      "unknown integrator '{}'; accepted are exponential_midpoint (or midpoint), euler, left, preintegrated, tolerance", name));
+}
+
+void validate_integrator(const RenderSettings& s) {
+  if (s.integrator == Integrator::exponential_midpoint) return;
+  if (s.mode != Mode::dvr)
+    throw UsageError(fmt::format("the mode {} takes the integrator exponential_midpoint alone; {} accepts the mode dvr",
+                                 mode_name(s.mode), integrator_name(s.integrator)));
+  if (s.integrator != Integrator::tolerance) return;
+  if (s.sampling != Sampling::adaptive)
+    throw UsageError("the integrator tolerance chooses its intervals: it accepts the sampling adaptive, not lattice");
+  if (!(s.tolerance > 0 && s.tolerance <= 1))
+    throw UsageError(
+        fmt::format("the tolerance {} is the error asked of a channel of a pixel; it must lie in (0, 1]", s.tolerance));
+}
+
+void validate_prune(const RenderSettings& s) {
+  if (!s.prune) return;
+  if (s.mode != Mode::dvr)
+    throw UsageError(
+        fmt::format("in mode {} the transfer function hides nothing for good; accepted: mode dvr", mode_name(s.mode)));
+  if (s.everything) throw UsageError("needs 'all' keeps what pruning leaves out; accepted: one of both");
+  if (s.prunes_levels())
+    throw UsageError("level_of_detail and max_level draw cells that pruning knows nothing of; accepted: one of both");
+  if (s.integrator == Integrator::preintegrated || s.integrator == Integrator::tolerance)
+    throw UsageError(
+        fmt::format("the integrator {} joins hidden values to visible ones; accepted: exponential_midpoint, euler, left",
+                    integrator_name(s.integrator)));
+}
 
 Mode parse_mode(std::string_view name) {
   for (const Mode mode : {Mode::dvr, Mode::projection, Mode::mip, Mode::iso, Mode::dvr_iso})
@@ -243,6 +324,26 @@ void validate(const Isosurfaces& iso) {
   for (const auto& point : iso.color) check_color(point.rgb, "isosurfaces: 'surface_color'");
   if (!(iso.tolerance > 0 && iso.tolerance <= 1))
     throw UsageError(fmt::format("isosurfaces: 'iso_tolerance' is {}; it must lie in (0, 1] cell widths", iso.tolerance));
+}
+
+void validate_light(const RenderSettings& s) {
+  if (!s.point_light) return;
+  const PointLight& light = *s.point_light;
+  if (!finite(light.position))
+    throw UsageError(fmt::format("'point_light' is ({}, {}, {}); it must be three finite numbers [x, y, z]", light.position.x,
+                                 light.position.y, light.position.z));
+  if (!(light.ambient >= 0 && light.ambient <= 1))
+    throw UsageError(fmt::format("'ambient' is {}; it must lie in [0, 1]", light.ambient));
+  if (!(light.shadow_step > 0 && std::isfinite(light.shadow_step)))
+    throw UsageError(fmt::format("'shadow_step' is {}; it must be above 0, in cell widths", light.shadow_step));
+  if (s.integrator != Integrator::exponential_midpoint)
+    throw UsageError(
+        fmt::format("'point_light' takes the integrator exponential_midpoint alone, not {}", integrator_name(s.integrator)));
+  if (s.draws_volume()) return;
+  const bool measures = s.mode == Mode::dvr_iso;
+  throw UsageError(fmt::format("'point_light' lights a volume: the modes dvr and dvr_iso (output color) accept it, not {}{}",
+                               mode_name(s.mode),
+                               measures ? fmt::format(" with output {}", output_name(s.isosurfaces.output)) : ""));
 }
 
 TransferFunction surface_colors(const Scene& scene) {

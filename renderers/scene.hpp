@@ -73,6 +73,13 @@ void validate(const TransferFunction& transfer_function);
 /// `iso` draws isosurfaces, `dvr_iso` isosurfaces inside the volume.
 enum class Mode { dvr, projection, mip, iso, dvr_iso };
 enum class Sampling { lattice, adaptive };
+/// Who draws: the raycaster in one pass, or one of those that draw the field's boxes one by one (box_consumer.hpp).
+enum class ConsumerKind { raycast, multipass, slices, stencil_slices };
+/// What slices are blended in. Eight bits a channel are the historical control: 256 slices are off by 0.1.
+enum class SliceTarget { rgba32f, rgba8 };
+/// How the light of an interval follows from samples (shaders/README.md, "Integrators"). `euler` and `left` are controls
+/// of order one; `tolerance` chooses its intervals itself.
+enum class Integrator { exponential_midpoint, euler, left, preintegrated, tolerance };
 /// What a picture of isosurfaces holds: colour; world distance from the ray's origin to the first surface,
 /// 0 where there is none; or the unit normal there (the gradient's direction), alpha 1, else all 0.
 enum class Output { color, depth, normal };
@@ -80,11 +87,17 @@ enum class Output { color, depth, normal };
 enum class Shading { none, gradient };
 std::string_view mode_name(Mode mode);
 std::string_view sampling_name(Sampling sampling);
+std::string_view consumer_name(ConsumerKind consumer);
+std::string_view slice_target_name(SliceTarget target);
+std::string_view integrator_name(Integrator integrator);
 std::string_view output_name(Output output);
 std::string_view shading_name(Shading shading);
 /// These throw UsageErrors that name the accepted ones.
 Mode parse_mode(std::string_view name);
 Sampling parse_sampling(std::string_view name);
+ConsumerKind parse_consumer(std::string_view name);
+SliceTarget parse_slice_target(std::string_view name);
+Integrator parse_integrator(std::string_view name);
 Output parse_output(std::string_view name);
 Shading parse_shading(std::string_view name);
 
@@ -105,21 +118,48 @@ struct Isosurfaces {
 /// Throws UsageError (no isovalue, too many, not ascending, opacities that do not fit, ...).
 void validate(const Isosurfaces& isosurfaces);
 
+/// A lamp in a volume (modes `dvr` and `dvr_iso`). What a place sends on is multiplied by
+/// ambient + (1 - ambient) exp(-optical depth of the drawn volume between the place and the lamp).
+struct PointLight {
+  Vec3d position{0};       ///< world; inside of the domain or not
+  double ambient = 0.1;    ///< light where the lamp does not reach, in [0, 1]
+  double shadow_step = 1;  ///< of the secondary ray: cell widths of each region (smallest edge)
+};
+
 struct RenderSettings {
+  ConsumerKind consumer = ConsumerKind::raycast;
+  SliceTarget slice_target = SliceTarget::rgba32f;  ///< consumers `slices` and `stencil_slices`
   Mode mode = Mode::dvr;
   Sampling sampling = Sampling::adaptive;
+  Integrator integrator = Integrator::exponential_midpoint;
+  double tolerance = 1e-3;          ///< error asked of every channel of a pixel; integrator `tolerance` alone
   double step = 1;                  ///< cell widths (smallest edge): of the finest level for lattice, of the region for adaptive
   int width = 512;                  ///< pixels
   int height = 512;                 ///< pixels
   bool skip = true;                 ///< regions that the transfer function makes invisible are skipped
   std::optional<double> early_end;  ///< opacity at which a ray ends; off when absent
+  bool prune = false;               ///< what the transfer function hides is not even built (mode dvr); then it may not change
+  bool everything = false;          ///< structures hold also what the scene does not need, to see what leaving out saves
   Isosurfaces isosurfaces;
+  std::optional<PointLight> point_light;  ///< absent: light of all places alike
+  /// Refined cells are drawn themselves where they are smaller on the picture, pixels; off when absent.
+  std::optional<double> level_of_detail;
+  std::optional<int> max_level;  ///< nothing finer is drawn where a cell of this level or a coarser one lies; off when absent
 
+  bool prunes_levels() const { return level_of_detail || max_level; }
   bool draws_volume() const { return mode == Mode::dvr || (mode == Mode::dvr_iso && isosurfaces.output == Output::color); }
+  bool draws_slices() const { return consumer == ConsumerKind::slices || consumer == ConsumerKind::stencil_slices; }
   bool draws_surfaces() const { return mode == Mode::iso || mode == Mode::dvr_iso; }
   /// Premultiplied colour (4 channels), or one raw number.
   int picture_channels() const;
 };
+
+/// Throws UsageError where what the transfer function hides cannot be left out without a change of the picture.
+void validate_prune(const RenderSettings& settings);
+/// Throws UsageError: a lamp whose numbers are none, or in a picture without a volume. Nothing where there is no lamp.
+void validate_light(const RenderSettings& settings);
+/// Throws UsageError where the integrator does not go with the mode, the sampling or the tolerance.
+void validate_integrator(const RenderSettings& settings);
 
 struct Scene {
   View view;

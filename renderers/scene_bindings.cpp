@@ -75,6 +75,50 @@ void add_table(const TransferFunction& tf, double unit, SceneBindings& b) {
   b.buffers.push_back(std::move(table));
 }
 
+/// Shader knots as u_knots in preintegrated.glsl; more stand in a buffer.
+constexpr std::size_t kMostKnots = 34;
+
+/// Both curves' points as one list, and one point beyond all values at each end.
+std::vector<double> knots(const TransferFunction& tf, double unit) {
+  constexpr double kFar = 1e30;
+  std::vector<double> values;
+  for (const auto& p : tf.extinction) values.push_back(p.value);
+  for (const auto& p : tf.color) values.push_back(p.value);
+  std::sort(values.begin(), values.end());
+  // the shader must be able to tell them apart
+  const auto same = [&](double a, double b) { return static_cast<float>(tf.axis(a)) == static_cast<float>(tf.axis(b)); };
+  values.erase(std::unique(values.begin(), values.end(), same), values.end());
+  std::vector<double> numbers;
+  const auto add = [&](double x, double inverse, double value) {
+    const Vec3d rgb = tf.color_at(value);
+    numbers.insert(numbers.end(), {x, inverse, std::min(tf.extinction_at(value) * unit, 1e30), rgb.r, rgb.g, rgb.b});
+  };
+  add(-kFar, 0, values.front());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double x = tf.axis(values[i]);
+    add(x, i + 1 < values.size() ? 1 / (tf.axis(values[i + 1]) - x) : 0, values[i]);
+  }
+  add(kFar, 0, values.back());
+  return numbers;
+}
+
+/// What preintegrated.glsl and tolerance.glsl need; returns AMRTEX_KNOTS.
+int add_knots(const TransferFunction& tf, double unit, SceneBindings& b) {
+  const std::vector<double> numbers = knots(tf, unit);
+  const std::size_t count = numbers.size() / 6;
+  // over log10 a line from a value near 0 would lie at tiny values nearly all of its way: a decade below the first point will do
+  b.uniforms.push_back({"u_knot_lowest", std::vector<double>{tf.logarithmic ? numbers[6] - 1 : -1e30}});
+  if (count <= kMostKnots) {
+    b.uniforms.push_back({"u_knots", numbers});
+    return static_cast<int>(count);
+  }
+  HostTexture buffer = make_buffer("transfer_knots", TexelFormat::r32f, static_cast<int>(numbers.size()));
+  std::transform(numbers.begin(), numbers.end(), buffer.as<float>(), [](double v) { return static_cast<float>(v); });
+  b.uniforms.push_back({"u_knot_count", std::vector<int>{static_cast<int>(count)}});
+  b.buffers.push_back(std::move(buffer));
+  return 0;
+}
+
 /// Intervals of values without extinction, first and last value of each; a little inside of
 /// the true ones, by what the shader's own evaluation may be off (`margin`, on the axis).
 std::vector<double> invisible_ranges(const TransferFunction& tf, double margin) {
@@ -94,30 +138,52 @@ std::vector<double> invisible_ranges(const TransferFunction& tf, double margin) 
   return ranges;
 }
 
+/// Is the transfer function evaluated from its points, or from a table?
+bool is_exact(const TransferFunction& tf) { return std::max(tf.extinction.size(), tf.color.size()) <= kMostPoints; }
+
+std::vector<double> invisible_ranges(const TransferFunction& tf) {
+  const double first = tf.axis(tf.extinction.front().value);
+  const double span = tf.axis(tf.extinction.back().value) - first;
+  return invisible_ranges(tf, is_exact(tf) ? 1e-6 * (span + std::abs(first)) : 1.01 * span / kTableBins);
+}
+
 std::vector<double> numbers(const Vec3d& v) { return {v.x, v.y, v.z}; }
 
 void add_camera(const AmrHierarchy& h, const Scene& scene, UniformValues& uniforms) {
   const RenderSettings& s = scene.settings;
+  const FinestCamera camera = finest_camera(h, scene);
+  uniforms.push_back({"u_eye", numbers(camera.eye), true});
+  uniforms.push_back({"u_forward", numbers(camera.forward), true});
+  uniforms.push_back({"u_right", numbers(camera.right), true});
+  uniforms.push_back({"u_up", numbers(camera.up), true});
+  uniforms.push_back({"u_orthographic", std::vector<int>{camera.orthographic ? 1 : 0}});
+  uniforms.push_back({"u_cells_per_unit", numbers(camera.cells_per_unit), true});
+  uniforms.push_back({"u_draw_lower", numbers(camera.lower), true});
+  uniforms.push_back({"u_draw_upper", numbers(camera.upper), true});
+  uniforms.push_back({"u_picture_size", std::vector<double>{static_cast<double>(s.width), static_cast<double>(s.height)}});
+}
+
+/// Of level_suffices() in contract.glsl. A cell w finest cells wide is smaller than the threshold where
+/// w * diagonal * pixels < threshold * distance; `pixels` are those of one world unit at distance 1, or at any one.
+void add_detail(const AmrHierarchy& h, const Scene& scene, UniformValues& uniforms) {
+  const RenderSettings& s = scene.settings;
   const CameraFrame camera = camera_frame(scene.view, s.width, s.height);
   const Vec3d spacing = h.spacing(h.finest_level());
   const double unit = smallest_edge(h);
-  const double to_units = camera.orthographic ? 1 / unit : 1;
-  const auto to_finest = [&](const Vec3d& p) { return (p - h.domain_lower()) / spacing; };
-  Vec3d lower{0};
-  Vec3d upper(h.cells(h.finest_level()));
-  if (scene.region) {
-    lower = glm::max(lower, to_finest((*scene.region)[0]));
-    upper = glm::max(lower, glm::min(upper, to_finest((*scene.region)[1])));
-  }
-  uniforms.push_back({"u_eye", numbers(to_finest(camera.eye)), true});
-  uniforms.push_back({"u_forward", numbers(camera.forward), true});
-  uniforms.push_back({"u_right", numbers(camera.right * to_units), true});
-  uniforms.push_back({"u_up", numbers(camera.up * to_units), true});
-  uniforms.push_back({"u_orthographic", std::vector<int>{camera.orthographic ? 1 : 0}});
-  uniforms.push_back({"u_cells_per_unit", numbers(Vec3d(unit) / spacing), true});
-  uniforms.push_back({"u_draw_lower", numbers(lower), true});
-  uniforms.push_back({"u_draw_upper", numbers(upper), true});
-  uniforms.push_back({"u_picture_size", std::vector<double>{static_cast<double>(s.width), static_cast<double>(s.height)}});
+  const double diagonal = unit * glm::length(spacing / unit);
+  const double pixels = s.height / 2.0 / glm::length(camera.up);
+  const double threshold = s.level_of_detail.value_or(0);
+  constexpr double kMost = 1e18;  // its square is a float
+  Vec3d scale(0);
+  double far = 0;
+  if (camera.orthographic)
+    far = std::min(threshold / (diagonal * pixels), kMost);
+  else
+    scale = glm::min(spacing / diagonal * (threshold / pixels), Vec3d(kMost));
+  uniforms.push_back({"u_detail_level", std::vector<int>{std::min(s.max_level.value_or(h.finest_level()), h.finest_level())}});
+  uniforms.push_back({"u_detail_eye", numbers((camera.eye - h.domain_lower()) / spacing)});
+  uniforms.push_back({"u_detail_scale", numbers(scale)});
+  uniforms.push_back({"u_detail_far", std::vector<double>{far * far}});
 }
 
 /// Bisections after which an interval between two samples is no longer than the tolerance.
@@ -156,6 +222,57 @@ void add_surfaces(const Scene& scene, const EncodedField& field, SceneBindings& 
   b.defines.emplace_back("AMRTEX_SHADING", iso.shading == Shading::gradient ? 1 : 0);
 }
 
+/// Beyond this distance, in diagonals of the domain, a lamp is moved nearer along its own direction: what changes
+/// is below the rounding of a float, in which positions of lamps further off may not fit.
+constexpr double kFarLamp = 1e7;
+
+void add_light(const AmrHierarchy& h, const RenderSettings& s, SceneBindings& b) {
+  validate_light(s);
+  b.defines.emplace_back("AMRTEX_SHADOWS", s.point_light ? 1 : 0);
+  if (!s.point_light) return;
+  const Vec3d middle = (h.domain_lower() + h.domain_upper()) * 0.5;
+  const double far = kFarLamp * glm::length(h.domain_upper() - h.domain_lower());
+  Vec3d way = s.point_light->position - middle;
+  if (const double most = std::max({std::abs(way.x), std::abs(way.y), std::abs(way.z)}); most > far) way *= far / most;
+  const Vec3d lamp = (middle - h.domain_lower() + way) / h.spacing(h.finest_level());
+  b.uniforms.push_back({"u_lamp", numbers(lamp), true});
+  b.uniforms.push_back({"u_lamp_ambient", std::vector<double>{s.point_light->ambient}});
+  b.uniforms.push_back({"u_shadow_step", std::vector<double>{s.point_light->shadow_step}});
+}
+
+void require_detail(const EncodedField& field, const RenderSettings& s) {
+  const auto& defines = field.shader.defines;
+  const auto it = std::find(defines.begin(), defines.end(), std::pair<std::string, int>("AMRTEX_LEVEL_OF_DETAIL", 1));
+  if (s.prunes_levels() && it == defines.end())
+    throw Error(fmt::format("level of detail: the structure of encoding {} was built without it", field.encoding));
+}
+
+/// Cells of one level that may lie in a row in a region: along the diagonal of its largest patch, or of the largest page.
+double longest_run(const AmrHierarchy& h) {
+  double longest = std::min(128 * std::sqrt(3.0), glm::length(Vec3d(h.cells(h.finest_level()))));
+  for (int l = 0; l < h.level_count(); ++l)
+    for (const Patch& p : h.patches(l)) longest = std::max(longest, glm::length(Vec3d(p.box.size())));
+  return longest;
+}
+
+/// Throws UsageError for what no picture can be made of, UnsupportedError for more steps than the loops count.
+void check_sampling(const AmrHierarchy& h, const Scene& scene) {
+  const double step = scene.settings.step;
+  if (!(step > 0) || !std::isfinite(step))
+    throw UsageError(fmt::format("step {}: accepted: a positive number of cell widths", step));
+  if (scene.region)
+    for (int a = 0; a < 3; ++a)
+      if (std::isnan((*scene.region)[0][a]) || std::isnan((*scene.region)[1][a]))
+        throw UsageError("region: a corner is no number; accepted: two corners in world units");
+  // lattice: samples of a ray are counted in 32 bits; adaptive: those of a region in a float's 24
+  const bool lattice = scene.settings.sampling == Sampling::lattice;
+  const double cells = lattice ? glm::length((h.domain_upper() - h.domain_lower()) / smallest_edge(h)) : longest_run(h);
+  const double most = lattice ? 0x1p31 : 0x1p24;
+  if (cells / step >= most)
+    throw UnsupportedError(fmt::format("step {}: {:.3g} samples of sampling {} may lie in a row; at most {:.3g} are counted",
+                                       step, cells / step, sampling_name(scene.settings.sampling), most));
+}
+
 /// What the shader draws: pictures of depth and normals have no volume.
 Mode shader_mode(const RenderSettings& s) { return s.mode == Mode::dvr_iso && !s.draws_volume() ? Mode::iso : s.mode; }
 
@@ -169,7 +286,59 @@ std::vector<double> value_scales(const EncodedField& field) {
   return scales;
 }
 
+/// Extinction per unit of ray length of an extinction of 1.
+double extinction_unit(const AmrHierarchy& h, const Scene& scene) {
+  const Vec3d size = h.domain_upper() - h.domain_lower();
+  const bool world = scene.transfer_function.length_unit == TransferFunction::LengthUnit::world;
+  return world ? smallest_edge(h) : smallest_edge(h) / std::max({size.x, size.y, size.z});
+}
+
+/// Longest interval that `tolerance` tries, in cell widths of the region.
+constexpr double kLongestInterval = 8;
+/// Error that one interval may have: a smaller tolerance needs more of them, so each gets a smaller part. Errors of
+/// intervals cancel in part, and corrected ones are smaller than estimated; the factor is measured (experiments/tolerance).
+double interval_error(double tolerance) { return 1.2 * std::pow(tolerance, 1.25); }
+/// Part of the tolerance that a ray may leave behind it.
+constexpr double kToleranceLeft = 0.1;
+
+void add_integrator(const Scene& scene, const EncodedField& field, double unit, SceneBindings& b) {
+  const RenderSettings& s = scene.settings;
+  validate_integrator(s);
+  b.defines.emplace_back("AMRTEX_INTEGRATOR", static_cast<int>(s.integrator));
+  const bool by_tolerance = s.integrator == Integrator::tolerance;
+  if (by_tolerance || s.integrator == Integrator::preintegrated)
+    b.defines.emplace_back("AMRTEX_KNOTS", add_knots(scene.transfer_function, unit, b));
+  if (!by_tolerance) return;
+  if (field.definition.filter == Filter::nearest)
+    throw UnsupportedError(
+        "integrator tolerance: the filter nearest jumps from cell to cell, which no interval follows; accepted "
+        "are linear_lod, linear_page, linear_vertex, basis");
+  b.uniforms.push_back({"u_interval_error", std::vector<double>{interval_error(s.tolerance)}});
+  b.uniforms.push_back({"u_longest", std::vector<double>{kLongestInterval}});
+}
+
 }  // namespace
+
+FinestCamera finest_camera(const AmrHierarchy& h, const Scene& scene) {
+  const CameraFrame frame = camera_frame(scene.view, scene.settings.width, scene.settings.height);
+  const Vec3d spacing = h.spacing(h.finest_level());
+  const double unit = smallest_edge(h);
+  const double to_units = frame.orthographic ? 1 / unit : 1;
+  const auto to_finest = [&](const Vec3d& p) { return (p - h.domain_lower()) / spacing; };
+  FinestCamera camera;
+  camera.eye = to_finest(frame.eye);
+  camera.forward = frame.forward;
+  camera.right = frame.right * to_units;
+  camera.up = frame.up * to_units;
+  camera.cells_per_unit = Vec3d(unit) / spacing;
+  camera.upper = Vec3d(h.cells(h.finest_level()));
+  camera.orthographic = frame.orthographic;
+  if (scene.region) {
+    camera.lower = glm::max(camera.lower, to_finest((*scene.region)[0]));
+    camera.upper = glm::max(camera.lower, glm::min(camera.upper, to_finest((*scene.region)[1])));
+  }
+  return camera;
+}
 
 UniformValues field_uniforms(const AmrHierarchy& h, const EncodedField& field) {
   const Vec3i n = h.cells(h.finest_level());
@@ -180,20 +349,27 @@ UniformValues field_uniforms(const AmrHierarchy& h, const EncodedField& field) {
   uniforms.push_back({"u_level_width", widths});
   uniforms.push_back({"u_range_origin", std::vector<double>{field.range_origin}});
   uniforms.push_back({"u_value_scale", value_scales(field)});
+  // without a scene nothing is pruned
+  uniforms.push_back({"u_detail_level", std::vector<int>{h.finest_level()}});
+  for (const char* name : {"u_detail_eye", "u_detail_scale"}) uniforms.push_back({name, numbers(Vec3d(0))});
+  uniforms.push_back({"u_detail_far", std::vector<double>{0}});
   for (const auto& [name, v] : field.integer_uniforms) uniforms.push_back({name, std::vector<int>{v.x, v.y, v.z}});
   return uniforms;
 }
 
 SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const Scene& scene) {
   const RenderSettings& s = scene.settings;
+  check_sampling(h, scene);
   const double unit = smallest_edge(h);
-  const Vec3d size = h.domain_upper() - h.domain_lower();
-  const double longest = std::max({size.x, size.y, size.z});
   SceneBindings b;
   b.uniforms = field_uniforms(h, field);
   add_camera(h, scene, b.uniforms);
+  require_detail(field, s);
+  if (s.prunes_levels()) add_detail(h, scene, b.uniforms);
   b.uniforms.push_back({"u_step", std::vector<double>{s.step}});
-  b.uniforms.push_back({"u_early_end", std::vector<double>{1 - s.early_end.value_or(1)}});
+  const bool by_tolerance = s.integrator == Integrator::tolerance;
+  const double least = by_tolerance ? kToleranceLeft * s.tolerance : 0;
+  b.uniforms.push_back({"u_early_end", std::vector<double>{std::max(1 - s.early_end.value_or(1), least)}});
   b.uniforms.push_back({"u_length_unit", std::vector<double>{unit}});
   // modes without a transfer function declare points of which nothing is read
   int extinction_points = 1;
@@ -201,8 +377,8 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
   int invisible_count = 0;
   if (s.draws_volume()) {
     const TransferFunction& tf = scene.transfer_function;
-    const double per_unit = tf.length_unit == TransferFunction::LengthUnit::world ? unit : unit / longest;
-    b.transfer_exact = std::max(tf.extinction.size(), tf.color.size()) <= kMostPoints;
+    const double per_unit = extinction_unit(h, scene);
+    b.transfer_exact = is_exact(tf);
     if (b.transfer_exact) {
       add_points(tf, per_unit, b.uniforms);
       extinction_points = static_cast<int>(tf.extinction.size());
@@ -212,10 +388,7 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
       color_points = 0;
       add_table(tf, per_unit, b);
     }
-    const double span = tf.axis(tf.extinction.back().value) - tf.axis(tf.extinction.front().value);
-    const double margin =
-        b.transfer_exact ? 1e-6 * (span + std::abs(tf.axis(tf.extinction.front().value))) : 1.01 * span / kTableBins;
-    const std::vector<double> invisible = invisible_ranges(tf, margin);
+    const std::vector<double> invisible = invisible_ranges(tf);
     invisible_count = static_cast<int>(invisible.size() / 2);
     if (invisible_count > 0) b.uniforms.push_back({"u_invisible_ranges", invisible});
   }
@@ -227,9 +400,11 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
                {"AMRTEX_MODE", static_cast<int>(shader_mode(s))},
                {"AMRTEX_LATTICE", s.sampling == Sampling::lattice ? 1 : 0},
                {"AMRTEX_SKIP", s.skip ? 1 : 0},
-               {"AMRTEX_EARLY_END", s.early_end && s.draws_volume() ? 1 : 0},
+               {"AMRTEX_EARLY_END", (s.early_end || by_tolerance) && s.draws_volume() ? 1 : 0},
                {"AMRTEX_ISOVALUES", s.draws_surfaces() ? static_cast<int>(s.isosurfaces.values.size()) : 0}};
+  add_light(h, s, b);
   if (s.draws_surfaces()) add_surfaces(scene, field, b);
+  add_integrator(scene, field, extinction_unit(h, scene), b);
   return b;
 }
 
@@ -237,8 +412,16 @@ SceneNeeds scene_needs(const Scene& scene, Filter filter, Filtering filtering) {
   SceneNeeds needs;
   needs.filter = filter;
   needs.filtering = filter == Filter::nearest ? Filtering::manual : filtering;
-  needs.value_ranges = scene.settings.skip;
-  needs.gradients = scene.settings.draws_surfaces() && scene.settings.isosurfaces.shading == Shading::gradient;
+  needs.level_of_detail = scene.settings.prunes_levels();
+  needs.draw_boxes = scene.settings.consumer != ConsumerKind::raycast;
+  needs.everything = scene.settings.everything;
+  needs.value_ranges = scene.settings.skip || needs.everything;
+  const bool lit = scene.settings.draws_surfaces() && scene.settings.isosurfaces.shading == Shading::gradient;
+  needs.gradients = lit || needs.everything;
+  if (!scene.settings.prune) return needs;
+  validate_prune(scene.settings);
+  const std::vector<double> ranges = invisible_ranges(scene.transfer_function);
+  for (std::size_t i = 0; i < ranges.size(); i += 2) needs.invisible.push_back({ranges[i], ranges[i + 1]});
   return needs;
 }
 

@@ -211,6 +211,7 @@ ShaderKey& ShaderKey::define(std::string_view name, int value) { return define(n
 ShaderKey& ShaderKey::use(const ShaderPart& part) {
   encoding_file = part.file;
   for (const auto& [name, value] : part.defines) define(name, value);
+  extensions.insert(extensions.end(), part.extensions.begin(), part.extensions.end());
   return *this;
 }
 

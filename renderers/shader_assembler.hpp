@@ -21,7 +21,7 @@ struct ShaderKey {
   /// Throws Error when the name has another text already.
   ShaderKey& define(std::string_view name, std::string_view text);
   ShaderKey& define(std::string_view name, int value);
-  /// The encoding's file and defines.
+  /// The encoding's file, defines and extensions.
   ShaderKey& use(const ShaderPart& part);
 };
 

@@ -29,6 +29,9 @@
 #ifndef AMRTEX_SCALED_STORAGE
 #error AMRTEX_SCALED_STORAGE must be defined: 1 where texels hold (value - a) / b, else 0
 #endif
+#ifndef AMRTEX_LEVEL_OF_DETAIL
+#error AMRTEX_LEVEL_OF_DETAIL must be defined: 1 where refined cells may be drawn in place of what lies below, else 0
+#endif
 #endif
 DEFINE_INT(AMRTEX_FILTER)
 DEFINE_INT(AMRTEX_HARDWARE_FILTERING)
@@ -39,6 +42,7 @@ DEFINE_INT(AMRTEX_FIELDS)
 DEFINE_INT(AMRTEX_VALIDITY)
 DEFINE_INT(AMRTEX_VALUE_RANGES)
 DEFINE_INT(AMRTEX_SCALED_STORAGE)
+DEFINE_INT(AMRTEX_LEVEL_OF_DETAIL)
 
 // the same numbers as enum class Filter (asserted in renderers/cpu_field.cpp.in)
 #define AMRTEX_FILTER_NEAREST 0
@@ -68,6 +72,7 @@ STRUCT Region {
   ivec4 handle;       // the encoding's own
   vec3r texture_lower;  // the encoding's own: texture coordinate of q = 0 (hardware filtering) ...
   vec3r texture_scale;  // ... and how much it grows with q
+  uvec4 brick;          // the encoding's own: handle of the texture that holds the region (x, y), and its number (z)
 };
 
 STRUCT FieldSample {
@@ -144,6 +149,24 @@ real stencil_value(IN(Stencil) s, IN(int) field, IN(ivec3) octant, IN(vec3r) q) 
   PRECISE vec3r f = from_first - vec3r(octant);
   return decode_value(trilinear(s.lower.x, s.lower.y, s.lower.z, s.lower.w, s.upper.x, s.upper.y, s.upper.z, s.upper.w, f), field);
 }
+
+#if AMRTEX_CPP || AMRTEX_LEVEL_OF_DETAIL
+UNIFORM(int, u_detail_level)    // nothing finer is drawn
+UNIFORM(vec3r, u_detail_eye)    // finest
+UNIFORM(vec3r, u_detail_scale)  // of a distance in finest cells: the widest cells, in finest cells, that suffice there ...
+UNIFORM(real, u_detail_far)     // ... and the square of their width at any distance (orthographic views)
+
+// May cells of `level` that are refined everywhere in a box (finest) be drawn themselves? `next` is the level that would
+// take their place. After Kaehler & Hege 2002, section 7: a ball as large as a cell's diagonal, where the box is nearest to
+// the eye, is smaller on the picture than the threshold. A pure function of box and scene.
+bool level_suffices(IN(ivec3) lower, IN(ivec3) upper, IN(int) level, IN(int) next) {
+  if (next > u_detail_level) return true;
+  PRECISE vec3r away = (clamp(u_detail_eye, vec3r(lower), vec3r(upper)) - u_detail_eye) * u_detail_scale;
+  PRECISE real widest = away.x * away.x + away.y * away.y + away.z * away.z + u_detail_far;
+  real width = real(level_width(level));
+  return width * width < widest;
+}
+#endif
 
 #include AMRTEX_ENCODING_FILE
 

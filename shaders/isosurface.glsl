@@ -174,14 +174,15 @@ real reflected_light(IN(Ray) ray, IN(vec3r) normal) {
   return u_surface_ambient + (real(1) - u_surface_ambient) * abs(dot(normal, direction));
 }
 
-// Adds an interval of the volume, or with a negative length takes back what lies behind a surface.
-void shift_volume(INOUT(Accumulation) a, IN(real) value, IN(real) length) {
+// Adds an interval of the volume, or with a negative length takes back what lies behind a surface; `lit` is the
+// light on it.
+void shift_volume(INOUT(Accumulation) a, IN(real) value, IN(real) length, IN(real) lit) {
   vec4r light = transfer(value);
   PRECISE real depth = light.w * length;
   if (!(abs(depth) < real(30))) return;  // opaque: nothing of it shows
   add_compensated(a, depth);
   real transmittance = exp(-a.sum);
-  a.color += vec3r(light.x, light.y, light.z) * (a.transmittance - transmittance);
+  a.color += vec3r(light.x, light.y, light.z) * (lit * (a.transmittance - transmittance));
   a.transmittance = transmittance;
 }
 
@@ -199,8 +200,8 @@ vec3r surface_color(IN(Position) p, IN(int) k) {
   return vec3r(u_surface_light[4 * k], u_surface_light[4 * k + 1], u_surface_light[4 * k + 2]);
 }
 
-void composite_surface(IN(Ray) ray, INOUT(Accumulation) a, IN(Position) p, IN(int) k) {
-  vec3r rgb = surface_color(p, k);
+void composite_surface(IN(Ray) ray, INOUT(Accumulation) a, IN(Position) p, IN(int) k, IN(real) lit) {
+  vec3r rgb = surface_color(p, k) * lit;
   if (AMRTEX_SHADING != 0) rgb = rgb * reflected_light(ray, surface_normal(p, u_isovalues[k]));
   add_compensated(a, u_surface_light[4 * k + 3]);
   real transmittance = min(exp(-a.sum), a.transmittance);
@@ -223,9 +224,15 @@ void draw_surface(IN(Ray) ray, INOUT(Accumulation) a) {
   // the part of an interval between its end and the surface is moved to the other side of it
   real shift = real(c.t - a.between);
   real value = shift > real(0) ? c.value_after : c.value_before;
-  if (AMRTEX_DRAWS_VOLUME) shift_volume(a, value, shift);
-  composite_surface(ray, a, p, k);
-  if (AMRTEX_DRAWS_VOLUME) shift_volume(a, value, -shift);
+  vec2r lit = vec2r(1);  // of the surface, and of the sample whose interval is split
+#if AMRTEX_CPP || AMRTEX_SHADOWS
+  if (AMRTEX_SHADOWS != 0)
+    for (int i = 0; i < 2; ++i)  // a loop: the text of a secondary ray stands here once
+      lit[i] = lamp_light(a, i == 0 ? p : make_position(ray.entry + ray.direction * (shift > real(0) ? a.after : a.before)));
+#endif
+  if (AMRTEX_DRAWS_VOLUME) shift_volume(a, value, shift, lit.y);
+  composite_surface(ray, a, p, k, lit.x);
+  if (AMRTEX_DRAWS_VOLUME) shift_volume(a, value, -shift, lit.y);
 }
 
 // An opaque surface ends a ray; pictures of depth and normals end at the first.

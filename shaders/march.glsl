@@ -19,6 +19,15 @@ DEFINE_INT(AMRTEX_EARLY_END)
 DEFINE_INT(AMRTEX_COUNT)
 DEFINE_INT(AMRTEX_RAY_DOUBLE)
 
+// q inside a region: at most so far from its lower corner that rounding does not carry it through a face.
+vec3r inside_region(IN(Region) r, IN(vec3r) q) {
+  return clamp(q, vec3r(0), vec3r(r.upper - r.lower) / real(r.width) * AMRTEX_BELOW_ONE);
+}
+
+#if AMRTEX_CPP || AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE
+#include "tolerance.glsl"
+#endif
+
 UNIFORM(real, u_step)       // cell widths: of the finest level (lattice) or of the region (adaptive)
 UNIFORM(real, u_early_end)  // transmittance at which a ray ends
 
@@ -50,13 +59,28 @@ void take_sample(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q, IN(real) leng
     if (a.crossing) return;  // the surface comes first; this sample is taken again after it
   }
 #endif
+#if AMRTEX_CPP || AMRTEX_PREINTEGRATED
+  if (AMRTEX_PREINTEGRATED) {
+    take_point(a, missing, value, length);
+    return;
+  }
+#endif
   if (missing) return;
+#if AMRTEX_CPP || AMRTEX_SHADOWS
+  if (AMRTEX_SHADOWS != 0) {
+    accumulate_lit(a, value, length, place_of(r, q));
+    return;
+  }
+#endif
   accumulate(a, value, length);
 }
 
 // Many intervals of one length in a region of one value: what take_sample does with each, in
-// the same order, so that the bits are the same; but one fetch and one transfer for all.
+// the same order, so that the bits are the same; but one fetch and one transfer for all. In the light of a lamp
+// each sample is its own: AMRTEX_CONSTANT_REGIONS is false.
 // `begin` and `way`: where the first interval begins, and from each to the next.
+#define AMRTEX_CONSTANT_REGIONS \
+  (AMRTEX_CELL_REGIONS && AMRTEX_FILTER == AMRTEX_FILTER_NEAREST && AMRTEX_SHADOWS == 0 && !AMRTEX_PREINTEGRATED)
 void take_constant_samples(INOUT(Accumulation) a, IN(Region) r, IN(real) count, IN(real) length, IN(ray_real) begin, IN(ray_real) way) {
   real value = fetch_field(r, vec3r(0.5));
   if (AMRTEX_COUNT != 0) a.counted.x += int(count);
@@ -82,14 +106,20 @@ void take_constant_samples(INOUT(Accumulation) a, IN(Region) r, IN(real) count, 
   }
 }
 
-void take_stencil_sample(INOUT(Accumulation) a, IN(Stencil) s, IN(ivec3) octant, IN(vec3r) q, IN(real) length, IN(ray_real) begin,
-                         IN(ray_real) at) {
+void take_stencil_sample(INOUT(Accumulation) a, IN(Region) r, IN(Stencil) s, IN(ivec3) octant, IN(vec3r) q, IN(real) length,
+                         IN(ray_real) begin, IN(ray_real) at) {
   if (AMRTEX_COUNT != 0) a.counted.x += 1;
   real value = stencil_value(s, 0, octant, q);
 #if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
   if (AMRTEX_ISOVALUES != 0) {
     note_side(a, false, value, begin, at);
     if (a.crossing) return;
+  }
+#endif
+#if AMRTEX_CPP || AMRTEX_SHADOWS
+  if (AMRTEX_SHADOWS != 0) {
+    accumulate_lit(a, value, length, place_of(r, q));
+    return;
   }
 #endif
   accumulate(a, value, length);
@@ -102,6 +132,10 @@ void pass_region(INOUT(Accumulation) a, IN(bool) inside, IN(Region) r, IN(ray_re
     a.below = inside ? isovalues_below(r.value_range.x) : -1;
     a.before = exit;
   }
+#endif
+  a.end_level = -1;
+#if AMRTEX_CPP || AMRTEX_PREINTEGRATED
+  if (AMRTEX_PREINTEGRATED && AMRTEX_LATTICE != 0 && !inside) take_point(a, true, real(0), u_step);
 #endif
 }
 
@@ -147,7 +181,7 @@ LatticeBlock lattice_block(IN(Ray) ray, IN(int) first) {
 
 // Offset of sample i of the block from its anchor cell, in whole quanta.
 vec3r lattice_offset(IN(LatticeBlock) block, IN(real) i) {
-  PRECISE vec3r way = block.step * (i + real(0.5));
+  PRECISE vec3r way = block.step * (i + AMRTEX_SAMPLE_PLACE);
   PRECISE vec3r offset = floor(block.fraction + way);
   return offset;
 }
@@ -163,7 +197,7 @@ int lattice_exit(IN(LatticeBlock) block, IN(vec3r) inverse_step, IN(Region) r, I
   vec3r plane = vec3r(face - block.cell) * AMRTEX_QUANTA;
   vec3r far = (plane - block.fraction) * inverse_step;
   real exit = min(min(far.x, far.y), min(far.z, real(count)));
-  int next = clamp(int(ceil(exit - real(0.5))), i + 1, count);
+  int next = clamp(int(ceil(exit - AMRTEX_SAMPLE_PLACE)), i + 1, count);
   // the division rounds; where the samples lie decides
   bool too_far = false;
   bool too_near = false;
@@ -226,9 +260,23 @@ vec3r lattice_q(IN(LatticeBlock) block, IN(LatticeFrame) frame, IN(Region) r, IN
 // Where sample i of the block lies, or with - 1/2 where its interval begins (units of ray length).
 ray_real lattice_place(IN(LatticeBlock) block, IN(real) i) { return ray_real(u_step) * (ray_real(block.first) + ray_real(i)); }
 
+#if AMRTEX_CPP || AMRTEX_PREINTEGRATED
+// Points first to next - 1 lie in a region that cannot be seen: no interval between them can, but those before and
+// behind them may be.
+void pass_points(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(Region) r, IN(int) first, IN(int) next) {
+  LatticeFrame frame = lattice_frame(block, r);
+  int i = first;
+  do {
+    take_sample(a, r, lattice_q(block, frame, r, real(i)), u_step, ray_real(0), ray_real(0));
+    a.end_state = i + 1 < next ? AMRTEX_END_NONE : a.end_state;
+    i = max(i + 1, next - 1);
+  } while (i < next);
+}
+#endif
+
 // Returns the sample that lies across a surface, or `next`.
 int march_lattice_region(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(Region) r, IN(int) first, IN(int) next) {
-  if (AMRTEX_CELL_REGIONS && AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) {
+  if (AMRTEX_CONSTANT_REGIONS) {
     take_constant_samples(a, r, real(next - first), u_step, lattice_place(block, real(first)), ray_real(u_step));
     return AMRTEX_ISOVALUES != 0 && a.crossing ? first : next;
   }
@@ -244,10 +292,10 @@ int march_lattice_region(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(Regio
   return AMRTEX_ISOVALUES != 0 && a.crossing ? int(i) - 1 : next;
 }
 
-// 1 / v without infinities: a ray along a face never ends a region through it.
+// 1 / v without infinities: a ray along a face, or almost along it, never ends a region through it.
 vec3r safe_inverse(IN(vec3r) v) {
-  vec3r tiny = vec3r(equal(v, vec3r(0))) * real(1e-20);
-  return real(1) / (v + tiny);
+  vec3r sense = vec3r(greaterThanEqual(v, vec3r(0))) * real(2) - vec3r(1);
+  return sense / max(abs(v), vec3r(1e-20));
 }
 
 // Samples from `first` on for which the eight values about it hold; returns the first that needs others, or
@@ -262,7 +310,7 @@ int march_lattice_stencil(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(Regi
   fetch_stencil(r, octant, s);
   bool holds = true;
   do {
-    take_stencil_sample(a, s, octant, q, u_step, lattice_place(block, i), lattice_place(block, i + real(0.5)));
+    take_stencil_sample(a, r, s, octant, q, u_step, lattice_place(block, i), lattice_place(block, i + real(0.5)));
     i += real(1);
     q = lattice_q(block, frame, r, i);
     holds = stencil_holds(s, octant, q);
@@ -295,6 +343,9 @@ int march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) f
         if (skipped || !stencils) i = lattice_exit(block, inverse_step, r, i, count);
         count_region(a, skipped);
         if (skipped) pass_region(a, inside, r, lattice_place(block, real(i) - real(0.5)));
+#if AMRTEX_CPP || AMRTEX_PREINTEGRATED
+        if (AMRTEX_PREINTEGRATED && skipped && inside) pass_points(a, block, r, first, i);
+#endif
       } while (skipped && i < count);
       if (stencils && !skipped) i = march_lattice_stencil(a, block, r, first, count);
       if (!stencils && !skipped) i = march_lattice_region(a, block, r, first, i);
@@ -303,22 +354,49 @@ int march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) f
   return i;
 }
 
-// The interval that is left after `whole` full ones.
-void march_lattice_rest(INOUT(Accumulation) a, IN(Ray) ray, IN(int) whole) {
-  ray_real start = ray_real(u_step) * ray_real(whole);
-  ray_real middle = (start + ray.length) * ray_real(0.5);
-  real length = real(ray.length - start);
+// A sample at `at` as a block of one, which lies at p. `whole`: full intervals before its own.
+LatticeBlock lattice_point(IN(Ray) ray, IN(int) whole, IN(ray_real) at, OUT(Position) p) {
   LatticeBlock block;
-  Position p = make_position(ray.entry + ray.direction * middle);
+  p = make_position(ray.entry + ray.direction * at);
   block.cell = p.cell;
   block.fraction = p.fraction * AMRTEX_QUANTA;
   block.step = vec3r(0);
   block.first = whole;
+  return block;
+}
+
+void take_lattice_point(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(Region) r, IN(ray_real) start, IN(ray_real) at, IN(real) length) {
+  take_sample(a, r, lattice_q(block, lattice_frame(block, r), r, real(0)), length, start, at);
+}
+
+// A sample at `at` for an interval of `length`, which begins at `start`.
+void march_lattice_point(INOUT(Accumulation) a, IN(Ray) ray, IN(int) whole, IN(ray_real) start, IN(ray_real) at, IN(real) length) {
+  Position p;
+  LatticeBlock block = lattice_point(ray, whole, at, p);
   Region r;
   bool inside = locate(p, r);
-  bool skipped = !inside || region_invisible(a, r);
+  bool skipped = !inside || (region_invisible(a, r) && !AMRTEX_PREINTEGRATED);
   count_region(a, skipped);
-  if (!skipped) take_sample(a, r, lattice_q(block, lattice_frame(block, r), r, real(0)), length, start, middle);
+  if (!skipped) take_lattice_point(a, block, r, start, at, length);
+#if AMRTEX_CPP || AMRTEX_PREINTEGRATED
+  if (AMRTEX_PREINTEGRATED && skipped) take_point(a, true, real(0), length);
+#endif
+}
+
+// The interval that is left after `whole` full ones.
+void march_lattice_rest(INOUT(Accumulation) a, IN(Ray) ray, IN(int) whole) {
+  ray_real start = ray_real(u_step) * ray_real(whole);
+  real length = real(ray.length - start);
+  if (AMRTEX_PREINTEGRATED) {  // the last full one's end, and the ray's
+    int i = 0;
+    do {
+      march_lattice_point(a, ray, whole, start, i == 0 ? start : ray.length, i == 0 ? u_step : length);
+      i += 1;
+    } while (i < 2 && length > real(0));
+    return;
+  }
+  bool left = AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_LEFT;
+  march_lattice_point(a, ray, whole, start, left ? start : (start + ray.length) * ray_real(0.5), length);
 }
 
 // Three nested loops (blocks, regions, samples): what is computed in an inner one is paid
@@ -333,7 +411,8 @@ void march_lattice(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
       first += AMRTEX_BLOCK;
     } while (first < whole && !ray_stopped(a));
   }
-  if (ray_real(u_step) * ray_real(whole) < ray.length && !ray_stopped(a)) march_lattice_rest(a, ray, whole);
+  bool rest = AMRTEX_PREINTEGRATED || ray_real(u_step) * ray_real(whole) < ray.length;
+  if (rest && !ray_stopped(a)) march_lattice_rest(a, ray, whole);
 }
 
 // ---- adaptive: each region is divided into equal intervals of at most `step` of its own cells.
@@ -366,7 +445,7 @@ real march_adaptive_cell(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(v
       fetch_stencil(r, octant, s);
       bool same = true;
       do {
-        take_stencil_sample(a, s, octant, q, interval, begin + ray_real(interval * (i - real(0.5))), begin + ray_real(interval * i));
+        take_stencil_sample(a, r, s, octant, q, interval, begin + ray_real(interval * (i - real(0.5))), begin + ray_real(interval * i));
         i += real(1);
         q = q0 + dq * i;
         same = all(equal(stencil_octant(q), octant));
@@ -376,24 +455,52 @@ real march_adaptive_cell(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(v
   return i - real(1);
 }
 
+#if AMRTEX_CPP || AMRTEX_PREINTEGRATED
+// Both ends of every interval, of this region's own values: a region beyond a face may have others there.
+void march_points(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(vec3r) dq, IN(real) count, IN(real) interval) {
+  real i = real(0);
+  a.end_state = AMRTEX_END_NONE;
+  do {
+    take_sample(a, r, inside_region(r, q0 + dq * i), interval, ray_real(0), ray_real(0));
+    i += real(1);
+  } while (i <= count && !ray_ended(a));
+}
+#endif
+
 // From interval middle `from` on; returns that across a surface, or of the last sample.
 real march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(vec3r) direction, IN(real) length, IN(ray_real) begin,
                            IN(real) from) {
   real inverse_width = real(1) / real(r.width);
-  real count = max(ceil(length * inverse_width / u_step - real(1e-4)), real(1));
+#if AMRTEX_CPP || AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE
+  if (AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE) {
+    march_tolerance_region(a, r, f * inverse_width, direction * inverse_width, length, AMRTEX_EARLY_END != 0 ? u_early_end : real(0));
+    return from;
+  }
+#endif
+  // a float counts to 2^24: the host refuses smaller steps, and no loop is endless
+  real count = clamp(ceil(length * inverse_width / u_step - real(1e-4)), real(1), real(16777216));
   real interval = length / count;
-  if (AMRTEX_CELL_REGIONS && AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) {
+  if (AMRTEX_CONSTANT_REGIONS) {
     ray_real first = begin + ray_real(interval * (from - real(0.5)));
     take_constant_samples(a, r, count - (from - real(0.5)), interval, first, ray_real(interval));
     return from;
   }
   vec3r q0 = f * inverse_width;
   vec3r dq = direction * (interval * inverse_width);
-  if (AMRTEX_CELL_REGIONS) return march_adaptive_cell(a, r, q0, dq, count, interval, begin, from);
+#if AMRTEX_CPP || AMRTEX_PREINTEGRATED
+  if (AMRTEX_PREINTEGRATED) {
+    march_points(a, r, q0, dq, count, interval);
+    return from;
+  }
+#endif
+  if (AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_LEFT) q0 -= dq * real(0.5);
+  if (AMRTEX_CELL_REGIONS && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST) return march_adaptive_cell(a, r, q0, dq, count, interval, begin, from);
   real i = from;
   if (i < count) {
     do {
-      take_sample(a, r, q0 + dq * i, interval, begin + ray_real(interval * (i - real(0.5))), begin + ray_real(interval * i));
+      vec3r q = q0 + dq * i;
+      if (AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_LEFT) q = inside_region(r, q);
+      take_sample(a, r, q, interval, begin + ray_real(interval * (i - real(0.5))), begin + ray_real(interval * i));
       i += real(1);
     } while (i < count && !ray_stopped(a));
   }
@@ -402,26 +509,32 @@ real march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(
 
 void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
   vec3r direction = vec3r(ray.direction);
-  vec3r inverse = safe_inverse(direction);
+  bvec3 forward = greaterThan(ray.direction, ray_vec3(0));
+  ray_vec3 speed = abs(ray.direction);
+  // along an axis that it does not move on, a ray leaves through no face, wherever rounding put it
+  ray_vec3 still = ray_vec3(lessThan(speed, ray_vec3(1e-20))) * ray_real(1e30);
+  ray_vec3 inverse = ray_real(1) / max(speed, ray_vec3(1e-20));
   ray_real t = front.t;
   Position p = front.p;
   real part = front.part;
   bool more = true;
   do {
     Region r;
-    vec3r f = vec3r(0);
-    real length = real(0);
+    ray_vec3 f = ray_vec3(0);  // as exact as the ray: in a large region a float would lose whole finest cells
+    ray_real length = ray_real(0);
     bool skipped = true;
     do {  // the next region that can be seen: all lanes of a SIMD group then sample together
       bool inside = locate(p, r);
       front.t = t;
       front.p = p;
-      f = vec3r(p.cell - r.lower) + p.fraction;
-      vec3r exits = max(-f * inverse, (vec3r(r.upper - r.lower) - f) * inverse);
-      length = max(min(exits.x, min(exits.y, exits.z)), real(0));
-      ray_real next = t + ray_real(length);
+      f = ray_vec3(p.cell - r.lower) + ray_vec3(p.fraction);
+      ray_vec3 size = ray_vec3(r.upper - r.lower);
+      ray_vec3 ahead = ray_vec3(forward.x ? size.x - f.x : f.x, forward.y ? size.y - f.y : f.y, forward.z ? size.z - f.z : f.z);
+      ray_vec3 exits = ahead * inverse + still;
+      length = max(min(exits.x, min(exits.y, exits.z)), ray_real(0));
+      ray_real next = t + length;
       more = next < ray.length;
-      if (!more) length = real(max(ray.length - t, ray_real(0)));
+      if (!more) length = max(ray.length - t, ray_real(0));
       skipped = !inside || region_invisible(a, r);
       count_region(a, skipped);
       if (skipped) pass_region(a, inside, r, next);
@@ -431,7 +544,7 @@ void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
       p = leave_region(ray, r, t, bvec3(x, y, !x && !y));
       more = more && all(greaterThanEqual(p.cell, ivec3(0))) && all(lessThan(p.cell, u_domain_cells));
     } while (skipped && more);
-    if (!skipped && length > real(0)) front.part = march_adaptive_region(a, r, f, direction, length, front.t, part);
+    if (!skipped && length > ray_real(0)) front.part = march_adaptive_region(a, r, vec3r(f), direction, real(length), front.t, part);
     part = real(0.5);
   } while (more && !ray_stopped(a));
 }
@@ -460,7 +573,14 @@ vec4r missed_picture() {
   return vec4r(real(0), real(0), real(0), real(AMRTEX_MODE == AMRTEX_MODE_PROJECTION || AMRTEX_MODE == AMRTEX_MODE_MIP ? 1 : 0));
 }
 
-// The picture's value for one ray: premultiplied RGBA, or (value, 0, 0, 1).
+// The picture's value for what a ray has gathered, surfaces apart: premultiplied RGBA, or (value, 0, 0, 1).
+vec4r volume_picture(IN(Accumulation) a) {
+  if (AMRTEX_MODE == AMRTEX_MODE_DVR) return vec4r(a.color, real(1) - a.transmittance);
+  if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION) return vec4r(a.sum * u_length_unit, real(0), real(0), real(1));
+  return vec4r(a.maximum < real(-3.4028235e38) ? real(0) : a.maximum, real(0), real(0), real(1));
+}
+
+// The picture's value for one ray.
 vec4r march_ray(IN(Ray) ray, INOUT(Accumulation) a) {
   Front front;
   front.next = 0;
@@ -474,7 +594,5 @@ vec4r march_ray(IN(Ray) ray, INOUT(Accumulation) a) {
   }
 #endif
   march(ray, a, front);
-  if (AMRTEX_MODE == AMRTEX_MODE_DVR) return vec4r(a.color, real(1) - a.transmittance);
-  if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION) return vec4r(a.sum * u_length_unit, real(0), real(0), real(1));
-  return vec4r(a.maximum < real(-2.9e38) ? real(0) : a.maximum, real(0), real(0), real(1));
+  return volume_picture(a);
 }

@@ -38,6 +38,13 @@
 #define BUFFER(T, name, block) \
   HostBuffer<T> name{};        \
   Bound bound_##name{bindings, #name, &(name)};
+// handles are the textures' numbers; one turn serves each
+#define VALUE_TEXTURE_SET(name, handles, block) \
+  ValueTextureSet<real> name{};                 \
+  HostHandles handles{};                        \
+  Bound bound_##name{bindings, #name, &(name)};
+#define SET_TEXEL(name, handle, texel) (name).fetch(handle, texel)
+#define SERVED_HANDLE(handle) (handle)
 #define DEFINE_INT(name) \
   int name{};            \
   Bound bound_##name{bindings, #name, &(name)};
@@ -86,6 +93,28 @@ class IntegerTexture : public Bindable {
 
  private:
   const HostTexture* texture_ = nullptr;
+};
+
+/// The textures of one name in the order of their handles.
+template <class real>
+class ValueTextureSet : public Bindable {
+ public:
+  void bind(const HostTexture& texture) override {
+    const auto i = static_cast<std::size_t>(texture.handle_index);
+    if (textures_.size() <= i) textures_.resize(i + 1);
+    textures_[i].bind(texture);
+  }
+  vec<4, real> fetch(const uvec2& handle, const ivec3& texel) const {
+    if (handle.x >= textures_.size()) throw Error("fetch from a texture that the set does not have");
+    return textures_[handle.x].fetch(texel);
+  }
+
+ private:
+  std::vector<ValueTexture<real>> textures_;
+};
+
+struct HostHandles {
+  uvec2 operator[](int i) const { return {static_cast<unsigned>(i), 0U}; }
 };
 
 template <class real>

@@ -31,6 +31,20 @@
   layout(std430) readonly restrict buffer block { T name[]; };
 #define DEFINE_INT(name)
 
+// A set of textures of values that handles reach (structures/texture_handles.hpp). `handles` is a storage buffer.
+#define VALUE_TEXTURE_SET(name, handles, block) BUFFER(uvec2, handles, block)
+#define SET_TEXEL(name, handle, texel) texelFetch(sampler3D(handle), texel, 0)
+#define SET_FILTERED(name, handle, uvw) textureLod(sampler3D(handle), uvw, 0.0)
+// One handle that is the same in all invocations that run together. Where a fetch may not see different handles
+// (AMRTEX_HANDLE_TURNS > 1), each takes as many turns as its group has handles; else everyone's own comes at once.
+#ifdef AMRTEX_HANDLE_TURNS
+#if AMRTEX_HANDLE_TURNS > 1
+#define SERVED_HANDLE(handle) uvec2(readFirstInvocationARB((handle).x), readFirstInvocationARB((handle).y))
+#else
+#define SERVED_HANDLE(handle) (handle)
+#endif
+#endif
+
 #define as_real(bits) uintBitsToFloat(bits)
 real no_value() { return uintBitsToFloat(0x7fc00000u); }
 bool is_no_value(real v) { return (floatBitsToUint(v) & 0x7fffffffu) > 0x7f800000u; }

@@ -4,6 +4,7 @@
 #include "ray.glsl"
 #include "transfer_function.glsl"
 #include "accumulate.glsl"
+#include "shadow.glsl"
 #include "isosurface.glsl"
 #include "march.glsl"
 

@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <cmath>
+#include <limits>
 
 namespace amrtex {
 
@@ -48,6 +49,18 @@ std::uint32_t encode_range(ValueRange range, double origin, Storage storage, Sto
   const std::uint32_t below = std::bit_cast<std::uint32_t>(low) >> 16;
   const std::uint32_t above = (std::bit_cast<std::uint32_t>(high) + 0xffffU) >> 16;
   return below | (std::min(above, 0x7f80U) << 16);
+}
+
+bool hidden(const SceneNeeds& needs, ValueRange range, double origin, Storage storage, StorageScale scale) {
+  if (needs.invisible.empty()) return false;
+  if (range.empty()) return true;
+  const std::uint32_t code = encode_range(range, origin, storage, scale);
+  // as decode_range and the uniforms: in floats
+  const float low = static_cast<float>(origin) + std::bit_cast<float>(code << 16);
+  const float high = static_cast<float>(origin) + std::bit_cast<float>(code & 0xffff0000U);
+  for (const auto& [first, last] : needs.invisible)
+    if (low >= static_cast<float>(first) && high <= static_cast<float>(last)) return true;
+  return false;
 }
 
 void store_values(Storage storage, StorageScale scale, const double* values, std::size_t count, std::byte* data,
@@ -99,21 +112,47 @@ int common_ratio_shift(const AmrHierarchy& hierarchy) {
 
 }  // namespace
 
+namespace {
+
+/// Throws UnsupportedError where 32-bit floats cannot hold the values, or a linear filter their differences.
+void require_float_values(const Encoding& encoding, const AmrHierarchy& h, const BuildRequest& request) {
+  constexpr double kMost = std::numeric_limits<float>::max();
+  if (request.storage == Storage::r64f) return;  // of the CPU's double precision
+  for (int i = 0; i < request.field_count(); ++i) {
+    const FieldStatistics& s = h.statistics(request.field_at(i));
+    const bool linear = request.needs.filter != Filter::nearest;
+    if (s.max > kMost || s.min < -kMost || (linear && s.max - s.min > kMost))
+      throw UnsupportedError(
+          fmt::format("encoding {}: values from {:.3g} to {:.3g} with filter {}; accepted: magnitudes{} up to {:.3g}, what a "
+                      "32-bit float holds",
+                      encoding.name(), s.min, s.max, filter_name(request.needs.filter), linear ? " and differences" : "", kMost));
+  }
+}
+
+}  // namespace
+
 bool any_missing(const AmrHierarchy& hierarchy, const BuildRequest& request) {
+  if (request.needs.everything) return true;
   for (int i = 0; i < request.field_count(); ++i)
     if (hierarchy.has_missing(request.field_at(i))) return true;
   return false;
 }
 
+Filtering stored_filtering(const BuildRequest& request) {
+  const bool linear = request.needs.filter != Filter::nearest;
+  return linear && request.storage != Storage::r64f ? request.needs.filtering : Filtering::manual;
+}
+
 EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request,
                          const Json& parameters) {
   require_fields(encoding, hierarchy, request);
+  require_level_of_detail(encoding, request.needs);
+  require_float_values(encoding, hierarchy, request);
   EncodedField field;
-  const bool linear = request.needs.filter != Filter::nearest;
   field.encoding = encoding.name();
   field.build_parameters = parameters;
   field.definition.filter = request.needs.filter;
-  field.filtering = linear && request.storage != Storage::r64f ? request.needs.filtering : Filtering::manual;
+  field.filtering = stored_filtering(request);
   field.storage = request.storage;
   const FieldStatistics& s = hierarchy.statistics(request.field);
   field.scale = storage_scale(request.storage, s.min, s.max);
@@ -133,7 +172,8 @@ EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy
                           {"AMRTEX_FIELDS", field.field_count},
                           {"AMRTEX_VALIDITY", any_missing(hierarchy, request) ? 1 : 0},
                           {"AMRTEX_VALUE_RANGES", request.needs.value_ranges ? 1 : 0},
-                          {"AMRTEX_SCALED_STORAGE", scaled ? 1 : 0}};
+                          {"AMRTEX_SCALED_STORAGE", scaled ? 1 : 0},
+                          {"AMRTEX_LEVEL_OF_DETAIL", request.needs.level_of_detail ? 1 : 0}};
   return field;
 }
 

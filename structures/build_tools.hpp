@@ -49,8 +49,16 @@ inline void set_bit(std::uint32_t* words, std::int64_t bit) { words[bit / 32] |=
 /// Does every refinement ratio equal a power of two?
 bool power_of_two_ratios(const AmrHierarchy& hierarchy);
 
-/// Must an encoding of the request's fields keep validity bits? One field with missing cells is enough.
+/// Can nothing with a value in `range` be seen? The rule by which shaders skip regions (transfer_visible), on the
+/// coded range. An empty range has nothing to see; without intervals in `needs` all else is visible.
+bool hidden(const SceneNeeds& needs, ValueRange range, double origin, Storage storage, StorageScale scale);
+
+/// Must an encoding of the request's fields keep validity bits? One field with missing cells is enough, or a scene
+/// that asks for everything.
 bool any_missing(const AmrHierarchy& hierarchy, const BuildRequest& request);
+
+/// What the built field is filtered by: `nearest` and r64f know no hardware filter.
+Filtering stored_filtering(const BuildRequest& request);
 
 /// Fields of EncodedField that are filled in the same way for every encoding.
 EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request,

@@ -129,7 +129,26 @@ void require_filter(const Encoding& encoding, Filter filter) {
         fmt::format("encoding {}: no filter {}; it has {}", encoding.name(), filter_name(filter), join_names(has, filter_name)));
 }
 
+void require_level_of_detail(const Encoding& encoding, const SceneNeeds& needs) {
+  const Support support = encoding.level_of_detail();
+  if (!needs.level_of_detail || support.ok) return;
+  std::vector<std::string_view> others;
+  for (const Encoding* e : all_encodings())
+    if (e->level_of_detail().ok) others.push_back(e->name());
+  throw UnsupportedError(
+      fmt::format("encoding {}: no level of detail (level_of_detail, max_level): {}; encodings that have it: {}", encoding.name(),
+                  support.reason, fmt::join(others, ", ")));
+}
+
 void require_fields(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request) {
+  if (!request.needs.invisible.empty() && !encoding.prunes()) {
+    std::vector<std::string_view> names;
+    for (const Encoding* e : all_encodings())
+      if (e->prunes()) names.push_back(e->name());
+    throw UnsupportedError(
+        fmt::format("encoding {}: prune: it has no parts that are left out where nothing is to be seen; accepted: {}",
+                    encoding.name(), fmt::join(names, ", ")));
+  }
   if (request.field_count() > kMostFields)
     throw UsageError(fmt::format("encoding {}: {} fields in one structure; at most {} are supported", encoding.name(),
                                  request.field_count(), kMostFields));

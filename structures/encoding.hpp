@@ -1,6 +1,8 @@
 // The C++ side of the sampler contract: what an encoding is to everybody else.
 #pragma once
 
+#include <array>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -9,6 +11,7 @@
 #include <vector>
 
 #include "amr_hierarchy.hpp"
+#include "draw_tree.hpp"
 #include "host_texture.hpp"
 
 namespace amrtex {
@@ -43,8 +46,12 @@ struct ContextInfo {
   std::string renderer, version, vendor;
   int max_3d_texture_size = 2048;                         ///< texels along an axis
   std::int64_t max_buffer_bytes = std::int64_t{1} << 27;  ///< of one shader storage block
-  bool bindless_texture = false;
+  bool bindless_texture = true;                           ///< textures by handles; without a context they are fetched on the CPU
+  bool shader_ballot = true;
+  bool handles_may_differ = false;  ///< in one fetch, between invocations that run together; else each is served in turn
+  std::int64_t max_resident_handles = std::numeric_limits<std::int64_t>::max();  ///< textures reached by handles at a time
   std::vector<std::string> extensions;
+  bool has_handle_limit() const { return max_resident_handles != std::numeric_limits<std::int64_t>::max(); }
 };
 
 struct Support {
@@ -56,8 +63,14 @@ struct Support {
 struct SceneNeeds {
   Filter filter = Filter::nearest;
   Filtering filtering = Filtering::manual;
-  bool value_ranges = true;  ///< regions are skipped by their value range
-  bool gradients = false;    ///< surfaces are lit: stored gradients are of use where an encoding has room for them
+  bool value_ranges = true;      ///< regions are skipped by their value range
+  bool gradients = false;        ///< surfaces are lit: stored gradients are of use where an encoding has room for them
+  bool level_of_detail = false;  ///< refined cells may be drawn in place of what lies below them
+  bool draw_boxes = false;       ///< the consumer draws box by box: EncodedField::draw_tree, where the encoding can give one
+  bool everything = false;   ///< nothing is left out for want of need: what leaving out saves is measured against this
+  /// First and last value of intervals without extinction, ascending (renderers/scene_bindings.hpp): parts of the structure whose
+  /// values lie in one of them are left out. Empty: all are kept.
+  std::vector<std::array<double, 2>> invisible = {};
   bool operator==(const SceneNeeds&) const = default;
 };
 
@@ -74,11 +87,19 @@ struct ParameterInfo {
   std::string accepted;  ///< for error messages: "an integer from 4 to 128"
 };
 
+/// A value of a parameter that a context cannot take.
+struct UnsupportedValue {
+  std::string parameter;
+  Json value;
+  std::string reason;
+};
+
 /// The shader's view of one built field: the file with its locate() and
 /// fetch_value(), and every define that the file requires.
 struct ShaderPart {
   std::string file;                                  ///< as known to the shader library, "page_table/page_table.glsl"
   std::vector<std::pair<std::string, int>> defines;  ///< name, value
+  std::vector<std::string> extensions = {};          ///< of GLSL, required
 };
 
 /// Built data: plain, independent of GL and of any consumer. One field of the mesh, or several
@@ -96,6 +117,7 @@ struct EncodedField {
   ShaderPart shader;
   std::vector<HostTexture> textures;
   std::vector<std::pair<std::string, Vec3i>> integer_uniforms;  ///< ivec3 uniforms of the encoding's GLSL
+  DrawTree draw_tree;  ///< empty where no consumer needs it, or where the encoding has no such boxes
   std::vector<LeftOut> left_out;
   Json statistics;                   ///< counts of the structure: pages, nodes, fill, ...
   std::int64_t host_peak_bytes = 0;  ///< arrays that the build itself allocated at once, the result included
@@ -135,6 +157,12 @@ class Encoding {
   /// Throws UsageError for values that no mesh would make acceptable. `parameters` is complete.
   virtual void check_parameters(const Json& parameters) const = 0;
   virtual Support supported(const ContextInfo& context) const = 0;
+  /// Values of parameters that build() refuses for want of something in the context, for tables and messages.
+  virtual std::vector<UnsupportedValue> unsupported_values(const ContextInfo& /*context*/) const { return {}; }
+  /// Can refined cells be drawn in place of what lies below them (SceneNeeds::level_of_detail)? Else why not.
+  virtual Support level_of_detail() const { return {false, "it stores no values of refined cells"}; }
+  /// Can parts that the transfer function hides be left out (SceneNeeds::invisible)? Others refuse to be asked.
+  virtual bool prunes() const { return false; }
   /// Builds the field. Throws UsageError for a bad parameter, UnsupportedError for
   /// a filter or a size that this encoding cannot take (naming what it can), and
   /// BudgetError before allocation when the result would pass the limits.
@@ -150,7 +178,10 @@ const Encoding& find_encoding(std::string_view name);
 Json complete_parameters(const Encoding& encoding, const Json& given);
 /// Throws UnsupportedError naming the filters that the encoding has.
 void require_filter(const Encoding& encoding, Filter filter);
-/// Throws UsageError that says how many fields are supported, or which index the mesh does not have.
+/// Throws UnsupportedError with the reason and the encodings that have it when a level of detail is needed and not there.
+void require_level_of_detail(const Encoding& encoding, const SceneNeeds& needs);
+/// Throws UsageError that says how many fields are supported, or which index the mesh does not have, and
+/// UnsupportedError where parts are to be left out and the encoding has none that could be.
 void require_fields(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request);
 /// Throws BudgetError with the bytes needed when `bytes` passes the limit.
 void require_budget(const Encoding& encoding, std::int64_t bytes, const BuildRequest& request);

@@ -47,8 +47,12 @@ struct HostTexture {
   Vec3i size{0};                 ///< texels; a buffer has its elements in x (y = z = 1)
   bool hardware_linear = false;  ///< filtered by the sampler rather than fetched texel by texel
   bool holds_values = false;     ///< counts towards texels_per_cell
-  MemoryByRole roles;            ///< sums to bytes()
-  std::vector<std::byte> data;   ///< x fastest
+  /// Buffer of rg32ui that receives this texture's 64-bit handle, lower half first, as element `handle_index`; the texture
+  /// is one of a set that shares its name (texture_handles.hpp). Empty: bound to the sampler of its name.
+  std::string handles;
+  std::int64_t handle_index = 0;
+  MemoryByRole roles;           ///< sums to bytes()
+  std::vector<std::byte> data;  ///< x fastest
 
   std::int64_t texels() const { return std::int64_t{size.x} * size.y * size.z; }
   std::int64_t bytes() const { return texels() * texel_bytes(format); }

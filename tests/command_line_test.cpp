@@ -147,7 +147,7 @@ Json one_point() { return with(small_experiment(), "encodings", {{{"name", "page
 // --- usage ---
 
 TEST_F(CommandLine, EveryCommandHasHelpWithAnExample) {
-  for (const std::string command : {"encodings", "doctor", "info", "generate", "convert", "sample", "render", "run", "report"}) {
+  for (const std::string command : {"encodings", "doctor", "info", "generate", "convert", "sample", "render", "run", "report", "verify"}) {
     const Result r = amrtex({command, "--help"});
     EXPECT_EQ(r.exit_code, 0) << command;
     EXPECT_THAT(r.out, HasSubstr("Example: amrtex " + command));
@@ -196,6 +196,26 @@ TEST_F(CommandLine, UnknownNamesNameTheAcceptedOnes) {
   expect_complaint(also("--parameter", "page_size=5"), 2, AllOf(HasSubstr("page_table"), HasSubstr("4, 8, 16, 32, 64 or 128")));
   expect_complaint(also("--parameter", "size=8"), 2, HasSubstr("page_size, centring"));
   expect_complaint(also("--parameter", "page_size"), 2, HasSubstr("NAME=VALUE"));
+}
+
+TEST_F(CommandLine, VerifyRefusesUnknownSuitesAndContexts) {
+  expect_complaint(amrtex({"verify", "--suite", "analytical"}), 2,
+                   AllOf(HasSubstr("'analytical'"), HasSubstr("analytic, convergence, stiff, extreme, geometry, differential")));
+  expect_complaint(amrtex({"verify", "--context", "vulkan"}), 2, AllOf(HasSubstr("vulkan"), HasSubstr("osmesa")));
+}
+
+TEST_F(CommandLine, VerifyWritesCasesAsJson) {
+  const Result r = amrtex({"verify", "--suite", "stiff", "--json", "--context", "osmesa"});
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(r.err, IsEmpty());
+  const Json json = Json::parse(r.out);
+  ASSERT_FALSE(json["cases"].empty());
+  for (const Json& c : json["cases"]) {
+    EXPECT_EQ(c["suite"], "stiff");
+    EXPECT_TRUE(c["pass"].get<bool>()) << c.dump();
+    for (const char* key : {"name", "encoding", "filter", "expected", "observed"}) EXPECT_TRUE(c.contains(key)) << key;
+  }
+  for (const Json& s : json["skipped"]) EXPECT_FALSE(s["reason"].get<std::string>().empty());
 }
 
 TEST_F(CommandLine, MissingDataIsSaidClearly) {
@@ -392,6 +412,21 @@ TEST_F(CommandLine, RenderWritesPngAndFloats) {
   EXPECT_GT(*std::max_element(picture.values.begin(), picture.values.end()), 0.1) << "an empty picture";
 }
 
+TEST_F(CommandLine, RenderExplainsAPicturesErrorByCause) {
+  const std::string scene = experiment_file(with(one_point(), "render", {{"mode", "projection"}, {"width", 16}, {"height", 16}}));
+  const Result table = amrtex({"render", scene, "--explain-error"});
+  EXPECT_EQ(table.exit_code, 0) << table.err;
+  for (const char* cause : {"step", "encoding", "storage", "arithmetic", "driver", "filtering", "early_end", "filter"})
+    EXPECT_THAT(table.out, HasSubstr(fmt::format("| {} |", cause)));
+  const Result json = amrtex({"render", scene, "--explain-error", "--json"});
+  const Json split = Json::parse(json.out).at("split");
+  EXPECT_GT(split.at("step").at("rmse"), 0);
+  EXPECT_LE(split.at("sum_closes"), 1e-12);
+  expect_complaint(amrtex({"render", scene}), 2, HasSubstr("-o is missing"));
+  expect_complaint(amrtex({"render", scene, "--json", "-o", at("a.png")}), 2, HasSubstr("--explain-error"));
+  expect_complaint(amrtex({"render", scene, "--explain-error", "--reference"}), 2, HasSubstr("--reference"));
+}
+
 TEST_F(CommandLine, RenderOfAValueHasOneChannelAndAColorBar) {
   const std::string scene = experiment_file(with(one_point(), "render", {{"mode", "projection"}, {"width", 32}, {"height", 64}}));
   EXPECT_EQ(amrtex({"render", scene, "-o", at("a.npy")}).exit_code, 0);
@@ -428,11 +463,26 @@ TEST_F(CommandLine, AnIsovalueOutsideTheRangeIsAnEmptyPictureAndAWarning) {
   EXPECT_EQ(*std::max_element(picture.values.begin(), picture.values.end()), 0);
 }
 
+TEST_F(CommandLine, RenderReachesTheErrorThatItIsAskedFor) {
+  Json json = with(one_point(), "render", {{"sampling", "adaptive"}, {"width", 24}, {"height", 24}});
+  json["filters"] = {"linear_page"};
+  const std::string scene = experiment_file(json);
+  EXPECT_EQ(amrtex({"render", scene, "-o", at("a.npy"), "--tolerance", "1e-3"}).exit_code, 0);
+  EXPECT_EQ(amrtex({"render", scene, "-o", at("r.npy"), "--reference"}).exit_code, 0);
+  EXPECT_GE(share_within(pixel_errors(read_npy(at("a.npy")), read_npy(at("r.npy"))), 1e-3), 0.95);
+}
+
 TEST_F(CommandLine, RenderRefusesWhatIsNoSceneOrNoPicture) {
   const std::string axes = experiment_file(small_experiment());
   expect_complaint(amrtex({"render", axes, "-o", at("a.png")}), 2, HasSubstr("encodings"));
   const std::string scene = experiment_file(one_point());
   expect_complaint(amrtex({"render", scene, "-o", at("a.tif")}), 2, AllOf(HasSubstr(".png"), HasSubstr(".npy")));
+  expect_complaint(amrtex({"render", scene, "-o", at("a.png"), "--tolerance", "1e-3"}), 2,
+                   AllOf(HasSubstr("--tolerance"), HasSubstr("adaptive, not lattice")));
+  const std::string adaptive =
+      experiment_file(with(one_point(), "render", {{"sampling", "adaptive"}, {"width", 8}, {"height", 8}}));
+  expect_complaint(amrtex({"render", adaptive, "-o", at("a.png"), "--tolerance", "0"}), 2,
+                   AllOf(HasSubstr("--tolerance"), HasSubstr("(0, 1]")));
   expect_complaint(amrtex({"render", scene, "-o", at("a.png"), "--memory-limit", "much"}), 2, HasSubstr("512MiB"));
   expect_complaint(amrtex({"render", scene, "-o", at("a.png"), "--memory-limit", "1KiB"}), 1, HasSubstr("bytes"));
   write_text(at("file"), "x");

@@ -112,7 +112,7 @@ TEST(Differential, GlIsTheReferenceAndTheCpusBitsOnRandomMeshes) {
         const auto filterings = c.filterings();
         const Filtering filtering = filterings[seed % filterings.size()];
         SCOPED_TRACE(fmt::format("{} seed {}: {} {}", context_kind_name(kind), 100 + seed, c.name(), filtering_name(filtering)));
-        const auto field = refusals.try_build(h, c, {.filtering = filtering});
+        const auto field = refusals.try_build(h, c, {.filtering = filtering, .limits = handle_limits(kind)});
         if (!field) continue;
         Context& gl = context(kind);
         const auto on_gl = probe_on_gl(gl, h, *field, GpuField(*field, gl), positions);

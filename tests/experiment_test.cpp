@@ -85,7 +85,7 @@ TEST(Experiment, OfOnePointHasTheDefaultsOfTheDocumentation) {
   EXPECT_EQ(e.datasets[0].generate["levels"], 2);
   EXPECT_EQ(e.renders[0].frames, 9);
   EXPECT_EQ(e.renders[0].warm_up, 2);
-  EXPECT_EQ(e.renders[0].consumer, "raycast");
+  EXPECT_EQ(e.renders[0].settings.consumer, ConsumerKind::raycast);
   EXPECT_EQ(e.renders[0].settings.width, 512);
   EXPECT_TRUE(e.renders[0].settings.skip);
   EXPECT_FALSE(e.renders[0].settings.early_end);
@@ -150,6 +150,35 @@ TEST(Experiment, RenderAxesViewsAndTransferFunctionsMultiply) {
   EXPECT_EQ(e.renders[6].transfer_function.extinction[1].extinction, 9);
   EXPECT_EQ(e.renders[2].settings.step, 0.25);
   EXPECT_EQ(e.renders[3].settings.sampling, Sampling::adaptive);
+}
+
+TEST(Experiment, ConsumersAreAnAxisAndOnlySlicesHaveATarget) {
+  const Experiment e = parsed(with("render", R"({"mode": "projection",
+      "consumer": ["raycast", "multipass", "slices", "stencil_slices"], "slice_target": ["rgba32f", "rgba8"]})"));
+  std::vector<std::string> points;
+  for (const RenderPoint& r : e.renders) {
+    const Json json = render_json(r);
+    points.push_back(json["consumer"].get<std::string>() + " " + json.value("slice_target", "-"));
+  }
+  EXPECT_THAT(points, ElementsAre("raycast -", "multipass -", "slices rgba32f", "slices rgba8", "stencil_slices rgba32f",
+                                  "stencil_slices rgba8"));
+}
+
+TEST(Experiment, AToleranceStandsForTheIntegratorThatKnowsItAndHasNoStep) {
+  const auto renders = [](const char* render) { return parsed(with("render", render)).renders; };
+  EXPECT_EQ(renders("{}")[0].settings.integrator, Integrator::exponential_midpoint);
+  EXPECT_EQ(renders(R"({"integrator": "midpoint"})")[0].settings.integrator, Integrator::exponential_midpoint);
+  const auto asked = renders(R"({"tolerance": [1e-2, 1e-3], "step": [1, 0.5]})");
+  ASSERT_EQ(asked.size(), 2u);
+  EXPECT_EQ(asked[1].settings.integrator, Integrator::tolerance);
+  EXPECT_EQ(asked[1].settings.tolerance, 1e-3);
+  EXPECT_EQ(render_json(asked[1])["tolerance"], 1e-3);
+  EXPECT_TRUE(render_json(asked[1])["step"].is_null());
+  // the others have no tolerance: 2 steps and 2 tolerances, not 4 and 4
+  const auto both = renders(R"({"integrator": ["euler", "tolerance"], "tolerance": [1e-2, 1e-3], "step": [1, 0.5]})");
+  ASSERT_EQ(both.size(), 4u);
+  EXPECT_EQ(render_json(both[0])["integrator"], "euler");
+  EXPECT_FALSE(render_json(both[0]).contains("tolerance"));
 }
 
 TEST(Experiment, ValuesThatAreListsBecomeAxesAsListsOfLists) {
@@ -341,11 +370,38 @@ TEST(ExperimentErrors, NameKeyAndWhatIsAccepted) {
       {"render", R"({"height": 18446744073709551615})", "render.height:", "an integer"},
       {"render", R"({"skip": 1})", "render.skip:", "true or false"},
       {"render", R"({"early_end": 2})", "render.early_end:", "from 0 to 1"},
-      {"render", R"({"consumer": "slices"})", "render.consumer:", "raycast"},
-      {"render", R"({"integrator": "euler"})", "render.integrator:", "exponential_midpoint"},
-      {"render", R"({"tolerance": 1})", "render.tolerance: not available in this version", "mode, sampling"},
-      {"render", R"({"prune": true})", "render.prune: not available in this version", "early_end"},
-      {"render", R"({"level_of_detail": 1})", "render.level_of_detail: not available in this version", "early_end"},
+      {"render", R"({"consumer": "splats"})", "render.consumer:", "raycast, multipass, slices, stencil_slices"},
+      {"render", R"({"consumer": "slices", "slice_target": "rgba16f"})", "render.slice_target:", "rgba32f, rgba8"},
+      {"render", R"({"point_light": [1, 2]})", "render.point_light:", "three numbers [x, y, z]"},
+      {"render", R"({"point_light": 5})", "render.point_light:", "three numbers [x, y, z]"},
+      {"render", R"({"point_light": [1, 2, "x"]})", "render.point_light[2]:", "number"},
+      {"render", R"({"point_light": [1, 2, 3], "ambient": 1.5})", "render.ambient:", "from 0 to 1"},
+      {"render", R"({"point_light": [1, 2, 3], "shadow_step": 0})", "render.shadow_step:", "above 0"},
+      {"render", R"({"ambient": 0.5})", "render.ambient:", "'point_light'"},
+      {"render", R"({"shadow_step": 2})", "render.shadow_step:", "'point_light'"},
+      {"render", R"({"integrator": "euler", "point_light": [1, 2, 3]})", "render.point_light:", "not euler"},
+      {"render", R"({"mode": "mip", "point_light": [1, 2, 3]})", "render.point_light:", "dvr and dvr_iso"},
+      {"render", R"({"mode": "iso", "isovalues": [1], "point_light": [1, 2, 3]})", "render.point_light:", "not iso"},
+      {"render", R"({"integrator": "simpson"})", "render.integrator:", "midpoint), euler, left, preintegrated, tolerance"},
+      {"render", R"({"mode": ["dvr", "projection"], "integrator": "euler"})", "render.integrator:", "accepts the mode dvr"},
+      {"render", R"({"mode": "mip", "integrator": "preintegrated"})", "render.integrator:", "accepts the mode dvr"},
+      {"render", R"({"mode": "projection", "tolerance": 0.1})", "render.tolerance:", "accepts the mode dvr"},
+      {"render", R"({"mode": "dvr_iso", "isovalues": [1], "integrator": "left"})", "render.integrator:", "accepts the mode dvr"},
+      {"render", R"({"sampling": "lattice", "integrator": "tolerance"})", "render.integrator:", "the sampling adaptive"},
+      {"render", R"({"sampling": "lattice", "tolerance": 0.001})", "render.tolerance:", "the sampling adaptive"},
+      {"render", R"({"tolerance": 0})", "render.tolerance:", "above 0"},
+      {"render", R"({"tolerance": [0.1, -0.1]})", "render.tolerance[1]:", "above 0"},
+      {"render", R"({"tolerance": 2})", "render.tolerance:", "(0, 1]"},
+      {"render", R"({"tolerance": "NaN"})", "render.tolerance:", "above 0"},
+      {"render", R"({"level_of_detail": 0})", "render.level_of_detail:", "above 0"},
+      {"render", R"({"level_of_detail": "pixel"})", "render.level_of_detail:", "above 0"},
+      {"render", R"({"max_level": -1})", "render.max_level:", "from 0 to 63"},
+      {"render", R"({"max_level": 1.5})", "render.max_level:", "an integer"},
+      {"render", R"({"mode": "projection", "prune": true})", "render.prune: in mode projection", "dvr"},
+      {"render", R"({"prune": true, "max_level": 1})", "render.prune:", "max_level"},
+      {"render", R"({"prune": true, "tolerance": 0.1})", "render.prune:", "integrator tolerance"},
+      {"render", R"({"prune": true, "needs": "all"})", "render.prune: needs 'all' keeps", "one of both"},
+      {"render", R"({"needs": "some"})", "render.needs", "scene, all"},
       {"render", R"({"clip_planes": [[1, 0, 0, 0]]})", "render.clip_planes: not available in this version", "early_end"},
       {"render", R"({"widht": 4})", "render.widht:", "did you mean 'width'?"},
       {"views", "[]", "views:", "empty list"},
@@ -447,6 +503,45 @@ TEST(Suggestion, OnlyNamesWhatIsNear) {
   const std::vector<std::string_view> names = {"width", "height"};
   EXPECT_EQ(suggestion("widht", names), "; did you mean 'width'?");
   EXPECT_EQ(suggestion("colour", names), "");
+}
+
+TEST(Prune, IsRefusedWhereTheTransferFunctionWillChange) {
+  Json json = Json::parse(with("render", R"({"mode": "dvr", "prune": true})"));
+  EXPECT_EQ(complaint(json.dump()), "accepted");
+  const Json one = json["transfer_function"];
+  Json other = one;
+  other["extinction"] = {{0.5, 0}, {1, 5}};
+  json["transfer_function"] = {one, other};
+  EXPECT_THAT(complaint(json.dump()), AllOf(HasSubstr("transfer_function"), HasSubstr("prune")));
+  json["transfer_function"] = one;
+  json["transfer_function"]["extinction"] = {{{0, 0}, {1, 5}}, {{0.5, 0}, {1, 5}}};
+  EXPECT_THAT(complaint(json.dump()), HasSubstr("prune"));
+}
+
+TEST(Prune, AndNeedsNameTheRecordOnlyWhereTheyAreNotTheDefault) {
+  const auto hash = [](const std::string& render) {
+    const Experiment e = parsed(with("render", render));
+    return configuration_hash(point_configuration(e, e.builds.front(), e.renders.front(), "mesh"));
+  };
+  EXPECT_EQ(hash("{}"), hash(R"({"prune": false, "needs": "scene"})"));
+  EXPECT_NE(hash("{}"), hash(R"({"prune": true})"));
+  EXPECT_NE(hash("{}"), hash(R"({"needs": "all"})"));
+}
+
+TEST(ExplainError, IsOffUnlessAskedForAndNamesTheRecordOnlyThen) {
+  const Experiment plain = parsed(kSmall);
+  const Experiment explained = parsed(with("explain_error", "true"));
+  EXPECT_FALSE(plain.explain_error);
+  EXPECT_TRUE(explained.explain_error);
+  const auto hash = [](const Experiment& e) {
+    return configuration_hash(point_configuration(e, e.builds.front(), e.renders.front(), "mesh"));
+  };
+  EXPECT_EQ(hash(plain), hash(parsed(with("explain_error", "false"))));
+  EXPECT_NE(hash(plain), hash(explained));
+  EXPECT_THAT(complaint(with("explain_error", "1")), HasSubstr("explain_error"));
+  Json both = Json::parse(with("explain_error", "true"));
+  both["reference"] = nullptr;
+  EXPECT_THAT(complaint(both.dump()), HasSubstr("no error to explain"));
 }
 
 }  // namespace

@@ -96,6 +96,19 @@ TEST(ReachesPsnr, PerfectPicturesAlwaysDo) {
   EXPECT_FALSE(reaches_psnr({.rmse = 0.1, .max = 0.1, .psnr_db = 20, .mrse = 0}, 20.1));
 }
 
+TEST(PixelErrors, AreTheLargestOverTheChannelsAndTheirPercentilesAreOnes) {
+  const Picture a = picture(2, 2, 4, {0, 0, 0, 0, 0.1, 0, 0, 0.3, 0, 0, 0, 0.2, 0, 0, 0.4, 0});
+  const Picture b = picture(2, 2, 4, std::vector<double>(16, 0.0));
+  const std::vector<double> errors = pixel_errors(a, b);
+  EXPECT_EQ(errors, (std::vector<double>{0, 0.2, 0.3, 0.4}));
+  EXPECT_EQ(percentile(errors, 0.5), 0.2);
+  EXPECT_EQ(percentile(errors, 0.75), 0.3);
+  EXPECT_EQ(percentile(errors, 0.95), 0.4);
+  EXPECT_EQ(percentile(errors, 0), 0);
+  EXPECT_EQ(share_within(errors, 0.3), 0.75);
+  EXPECT_EQ(share_within(errors, 0.29), 0.5);
+}
+
 TEST(ErrorMetricsTable, PerfectValuesAreThoseOfAPerfectPicture) {
   const Picture p = picture(1, 1, 4, {0, 0, 0, 0});
   const ErrorMetrics error = compare(p, p);

@@ -1,76 +1,10 @@
 // Pictures in tests: views, drawing, comparing; every case of every encoding.
 #pragma once
 
-#include "renderers/raycaster.hpp"
+#include "bench/verify/pictures.hpp"
 #include "tests/encoding_cases.hpp"
 
 namespace amrtex::test {
-
-inline View orthographic(const Vec3d& at, const Vec3d& direction, double height) {
-  View view;
-  view.at = at;
-  view.eye = at - direction * 3.0;
-  view.up = std::abs(direction.z) > 0.9 * glm::length(direction) ? Vec3d(0, 1, 0) : Vec3d(0, 0, 1);
-  view.orthographic = true;
-  view.height = height;
-  return view;
-}
-
-inline View perspective(const Vec3d& eye, const Vec3d& at) {
-  View view;
-  view.eye = eye;
-  view.at = at;
-  return view;
-}
-
-inline TransferFunction constant_light(double extinction) {
-  TransferFunction tf;
-  tf.extinction = {{0, extinction}};
-  tf.color = {{0, {0.75, 0.5, 0.25}}};
-  return tf;
-}
-
-/// World length of the pixel's ray inside the box.
-inline double chord(const Scene& scene, int x, int y, const Vec3d& lower, const Vec3d& upper) {
-  const RenderSettings& s = scene.settings;
-  const WorldRay ray = camera_ray(camera_frame(scene.view, s.width, s.height), x, y, s.width, s.height);
-  double from = 0;
-  double to = kInf;
-  for (int a = 0; a < 3; ++a) {
-    if (ray.direction[a] == 0) {
-      if (ray.origin[a] < lower[a] || ray.origin[a] > upper[a]) return 0;
-      continue;
-    }
-    const double t0 = (lower[a] - ray.origin[a]) / ray.direction[a];
-    const double t1 = (upper[a] - ray.origin[a]) / ray.direction[a];
-    from = std::max(from, std::min(t0, t1));
-    to = std::min(to, std::max(t0, t1));
-  }
-  return std::max(to - from, 0.0);
-}
-
-inline Picture draw(Context& gl, const AmrHierarchy& h, const EncodedField& field, const Scene& scene,
-                    WorkCounts* counts = nullptr) {
-  const GpuField gpu(field, gl);
-  Raycaster raycaster(gl, h, field, gpu, scene);
-  raycaster.draw();
-  Picture picture = raycaster.read();
-  if (counts != nullptr) *counts = raycaster.count();
-  return picture;
-}
-
-/// Largest difference; infinite where sizes differ or a value is NaN.
-inline double difference(const Picture& a, const Picture& b) {
-  if (a.values.size() != b.values.size() || a.values.empty()) return kInf;
-  double largest = 0;
-  for (std::size_t i = 0; i < a.values.size(); ++i) {
-    const double d = std::abs(a.values[i] - b.values[i]);
-    largest = std::max(largest, std::isnan(d) ? kInf : d);
-  }
-  return largest;
-}
-
-inline double largest(const Picture& p) { return *std::max_element(p.values.begin(), p.values.end()); }
 
 template <class F>
 void for_each_case(F&& f) {

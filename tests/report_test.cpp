@@ -407,5 +407,18 @@ TEST_F(PaperTables, ErrorsNameLineKeyAndWhatIsAccepted) {
               HasSubstr("/render/mode is no number in a record; accepted: a number, or a timing"));
 }
 
+TEST(SplitTable, HasARowForEachRecordThatExplainsItsErrorAndAColumnForEachCause) {
+  std::vector<Json> records = sizes();
+  const Json pair = {{"rmse", 0.25}, {"max", 0.5}};
+  records[0]["error"]["split"] = {{"step", pair}, {"encoding", {{"rmse", 0.0}, {"max", 0.0}}}, {"early_end", nullptr}};
+  const auto tables = make_tables(records);
+  ASSERT_EQ(tables.size(), 2u);
+  EXPECT_THAT(tables[1].title, HasSubstr("by cause"));
+  EXPECT_THAT(keys(tables[1]), ElementsAre("encoding", "split_step", "split_encoding", "rmse"));
+  EXPECT_THAT(cells(tables[1], "split_step"), ElementsAre("0.25"));
+  EXPECT_THAT(cells(tables[1], "split_encoding"), ElementsAre("0"));
+  EXPECT_EQ(make_tables(sizes()).size(), 1u);
+}
+
 }  // namespace
 }  // namespace amrtex

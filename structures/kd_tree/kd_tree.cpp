@@ -8,11 +8,14 @@
 #include <cmath>
 #include <map>
 
-#include "structures/brick_packing.hpp"
+#include "hidden_leaves.hpp"
+#include "kd_detail.hpp"
+#include "kd_draw_tree.hpp"
 #include "kd_partition.hpp"
 #include "start_grid.hpp"
 #include "structures/build_tools.hpp"
 #include "structures/level_values.hpp"
+#include "structures/texture_handles.hpp"
 #include "structures/vertex_values.hpp"
 
 namespace amrtex {
@@ -27,14 +30,22 @@ constexpr int kChunk = 32;
 /// A start grid takes at most this part of what tree and pool take.
 constexpr std::int64_t kGridShare = 16;
 
+constexpr const char* kPoolName = "tex_kd_pool";
+constexpr const char* kBricksName = "tex_kd_bricks";
+constexpr const char* kHandlesName = "kd_handles";
+constexpr const char* kBindless = "storage_kind \"bindless\"";
+
 struct Options {
+  bool bindless = false;  ///< a texture a brick, no pool
   bool paper_packing = false;
   bool grid = true;
+  bool wrap = false;
+  bool detail = false;  ///< refined cells may be drawn
   bool vertices = false;
   int border = 0;  ///< texels before the first cell of a brick
 };
 
-/// What is stored of one subgrid: the box around its drawn leaves.
+/// What is stored of one subgrid: the box around its drawn blocks.
 struct Brick {
   int level;
   int patch;
@@ -43,20 +54,44 @@ struct Brick {
   Box texels(const Options& o) const { return o.vertices ? Box{cells.lower, cells.upper + Vec3i(1)} : cells.grown(o.border); }
 };
 
+/// What was left out because the scene does not show it.
+struct Pruned {
+  std::int64_t leaves = 0;
+  std::int64_t bricks = 0;        ///< subgrids of which nothing is stored
+  std::int64_t brick_cells = 0;   ///< of bricks, by which the others shrank included
+  std::int64_t brick_texels = 0;  ///< the same with borders
+  std::int64_t leaf_cells = 0;
+};
+
 struct Plan {
   Tree tree;
+  Pruned pruned;
   std::vector<Brick> bricks;
   std::vector<int> brick_of;  ///< a leaf
-  Packing packing;
+  Packing packing;            ///< bindless: every brick at 0 and the largest extents
   StartGrid grid;
   Vec3i position_bits{0};  ///< of a packed position
   int data_words = 1;
   std::int64_t validity_words = 0;
   std::int64_t brick_texels = 0;
   std::int64_t leaf_cells = 0;
+  std::int64_t detail_cells = 0;  ///< refined ones that are stored
+  std::int64_t leaf_count = 0;
+  std::int64_t leaf_bricks = 0;  ///< that hold a leaf
   std::int64_t node_count() const { return static_cast<std::int64_t>(tree.nodes.size()); }
-  std::int64_t leaf_count() const { return static_cast<std::int64_t>(tree.leaves.size()); }
+  std::int64_t brick_count() const { return static_cast<std::int64_t>(bricks.size()); }
+  /// Texels of one field.
+  std::int64_t texels(const Options& o) const { return o.bindless ? brick_texels : packing.texels(); }
+  std::int64_t block_count() const { return static_cast<std::int64_t>(tree.leaves.size()); }
 };
+
+/// Adds a block's cells to those of leaves, or to the refined ones.
+void count_block(const Leaf& block, std::int64_t& leaf_cells, std::int64_t& refined_cells) {
+  if (block.next == kNothingFiner)
+    leaf_cells += block.cells.cells();
+  else if (!block.repeated)
+    refined_cells += block.cells.cells();
+}
 
 std::vector<Brick> make_bricks(const Tree& tree, std::vector<int>& brick_of) {
   std::map<std::pair<int, int>, int> known;  // level, patch
@@ -73,6 +108,11 @@ std::vector<Brick> make_bricks(const Tree& tree, std::vector<int>& brick_of) {
   return bricks;
 }
 
+/// Normalised coordinates of a brick's texels: the pool's size is a define.
+bool needs_brick_sizes(const BuildRequest& request, const Options& o) {
+  return o.bindless && stored_filtering(request) == Filtering::hardware;
+}
+
 /// Node-centred bricks lie side by side without a border: in a brick's last vertex the rounding of the
 /// normalised coordinate (3 times 2^-24 of the pool an axis) lets the texture unit see a little of the next brick.
 double leaked_value(const FieldStatistics& s, const Vec3i& pool) {
@@ -80,8 +120,31 @@ double leaked_value(const FieldStatistics& s, const Vec3i& pool) {
   return weight * std::max({s.max - s.min, std::abs(s.min), std::abs(s.max)});
 }
 
+/// Removes the leaves of which nothing can be seen. A brick is then the box around those that are left.
+Pruned prune(const AmrHierarchy& h, const BuildRequest& request, const Options& o, Tree& tree) {
+  Pruned pruned;
+  if (request.needs.invisible.empty()) return pruned;
+  const auto count = [&](const Tree& t, int sign) {
+    std::vector<int> brick_of;
+    for (const Brick& b : make_bricks(t, brick_of)) {
+      pruned.bricks += sign;
+      pruned.brick_cells += sign * b.cells.cells();
+      pruned.brick_texels += sign * b.texels(o).cells();
+    }
+    for (const Leaf& leaf : t.leaves) pruned.leaf_cells += sign * leaf.cells.cells();
+    pruned.leaves += sign * static_cast<std::int64_t>(t.leaves.size());
+  };
+  count(tree, 1);
+  // the pool's size is not known yet; it is no larger
+  const Vec3i largest_pool(request.context.max_3d_texture_size);
+  const double leak = o.vertices ? leaked_value(h.statistics(request.field), largest_pool) : 0;
+  remove_leaves(tree, hidden_leaves(h, request, tree, {o.vertices, o.border, leak}));
+  count(tree, -1);
+  return pruned;
+}
+
 struct Stores {
-  std::vector<HostTexture> pools;  ///< one a field, all laid out in the same way
+  std::vector<HostTexture> values;  ///< one pool a field, all laid out in the same way; or one texture a brick and field
   HostTexture data;
   HostTexture validity;  ///< without data where every cell has a value
 };
@@ -92,8 +155,8 @@ class BrickWriter {
   BrickWriter(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& plan, const EncodedField& field,
               Stores& out)
       : hierarchy_(h), request_(request), options_(o), plan_(plan), field_(field), out_(out) {
-    const HostTexture& pool = out.pools.front();
-    if (pool.hardware_linear && o.vertices) leak_ = leaked_value(h.statistics(request.field), pool.size);
+    if (field.filtering == Filtering::hardware && o.vertices)
+      leak_ = leaked_value(h.statistics(request.field), plan.packing.size);
   }
 
   void write(int brick) {
@@ -113,7 +176,7 @@ class BrickWriter {
       store(brick, number);
       note(leaf, chunk, number);
     });
-    if (number == 0 && request_.needs.value_ranges) data_node(leaf)[1] = coded_range();
+    if (number == 0 && request_.needs.value_ranges) data_node(leaf)[options_.bindless ? 2 : 1] = coded_range();
   }
 
   std::uint32_t* data_node(int leaf) const {
@@ -137,13 +200,14 @@ class BrickWriter {
   void store(int brick, int number) {
     const auto b = static_cast<std::size_t>(brick);
     const Vec3i shift = plan_.packing.at[b] - plan_.bricks[b].texels(options_).lower;
-    HostTexture& pool = out_.pools[static_cast<std::size_t>(number)];
-    const Box all{Vec3i(0), pool.size};
+    const int textures = options_.bindless ? brick * field_.field_count : 0;  // of bricks before this one
+    HostTexture& texture = out_.values[static_cast<std::size_t>(textures + number)];
+    const Box all{Vec3i(0), texture.size};
     const auto row = static_cast<std::size_t>(box_.size().x);
     for (int z = box_.lower.z; z < box_.upper.z; ++z)
       for (int y = box_.lower.y; y < box_.upper.y; ++y) {
         const Vec3i first(box_.lower.x, y, z);
-        store_values(pool.format, field_.scale_of(number), &values_[box_.offset(first)], row, pool.data.data(),
+        store_values(texture.format, field_.scale_of(number), &values_[box_.offset(first)], row, texture.data.data(),
                      all.offset(first + shift));
       }
   }
@@ -192,20 +256,29 @@ class KdTree final : public Encoding {
     return {
         {"storage_kind", "where bricks are stored: in one texture, or each in its own", "pool", "\"pool\" or \"bindless\""},
         {"packing", "how bricks are packed into the pool", "best_fit", "\"best_fit\" or \"nfdh\""},
-        {"traversal", "where the search for a leaf starts: at a grid's cell, or at the root", "grid", "\"grid\" or \"restart\""}};
+        {"traversal", "where the search for a leaf starts: at a grid's cell, or at the root", "grid", "\"grid\" or \"restart\""},
+        {"wrap", "is what lies outside of all subgrids of a node split off before it is divided among them?", true,
+         "true or false"}};
   }
-  void check_parameters(const Json& parameters) const override { options(parameters, Filter::nearest); }
+  void check_parameters(const Json& parameters) const override { options(parameters, {}); }
   Support supported(const ContextInfo&) const override { return {}; }
+  std::vector<UnsupportedValue> unsupported_values(const ContextInfo& context) const override {
+    const Support support = supports_handles(context);
+    if (support.ok) return {};
+    return {{"storage_kind", "bindless", support.reason}};
+  }
+  Support level_of_detail() const override { return {}; }
+  bool prunes() const override { return true; }
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
-  Options options(const Json& parameters, Filter filter) const;
+  Options options(const Json& parameters, const SceneNeeds& needs) const;
   Plan plan(const AmrHierarchy& h, const BuildRequest& request, const Options& o) const;
   void plan_pool(const BuildRequest& request, const Options& o, Plan& p) const;
-  void require_sizes(const BuildRequest& request, const Plan& p) const;
+  void require_sizes(const BuildRequest& request, const Options& o, const Plan& p) const;
 };
 
-Options KdTree::options(const Json& parameters, Filter filter) const {
+Options KdTree::options(const Json& parameters, const SceneNeeds& needs) const {
   const auto second = [&](const char* name, const char* first_value, const char* second_value) {
     const Json& value = parameters.at(name);
     if (value != first_value && value != second_value)
@@ -213,12 +286,17 @@ Options KdTree::options(const Json& parameters, Filter filter) const {
                                    first_value, second_value));
     return value == second_value;
   };
-  second("storage_kind", "pool", "bindless");
   Options o;
+  o.bindless = second("storage_kind", "pool", "bindless");
   o.paper_packing = second("packing", "best_fit", "nfdh");
   o.grid = !second("traversal", "grid", "restart");
-  o.vertices = filter == Filter::linear_vertex;
-  o.border = filter == Filter::linear_lod ? 1 : 0;
+  if (!parameters.at("wrap").is_boolean())
+    throw UsageError(
+        fmt::format("encoding kd_tree: parameter wrap is {}; accepted: true or false", parameters.at("wrap").dump()));
+  o.wrap = parameters.at("wrap").get<bool>();
+  o.detail = needs.level_of_detail;
+  o.vertices = needs.filter == Filter::linear_vertex;
+  o.border = needs.filter == Filter::linear_lod || (needs.everything && !o.vertices) ? 1 : 0;
   return o;
 }
 
@@ -233,6 +311,8 @@ void KdTree::plan_pool(const BuildRequest& request, const Options& o, Plan& p) c
   const int limit = request.context.max_3d_texture_size;
   if (sizes.empty())
     p.packing.size = Vec3i(1);
+  else if (o.bindless && std::max({largest.x, largest.y, largest.z}) <= limit)
+    p.packing = {largest, std::vector<Vec3i>(sizes.size(), Vec3i(0))};
   else if (std::max({largest.x, largest.y, largest.z}) <= limit)
     p.packing = o.paper_packing ? pack_nfdh(sizes, limit) : pack_best_fit(sizes, limit);
   if (!p.packing.valid())
@@ -243,20 +323,24 @@ void KdTree::plan_pool(const BuildRequest& request, const Options& o, Plan& p) c
   const int bits = p.position_bits.x + p.position_bits.y + p.position_bits.z;
   if (bits > 32)
     throw UnsupportedError(
-        fmt::format("encoding kd_tree: positions in a pool of {} x {} x {} texels take {} bits, a data node has 32",
-                    p.packing.size.x, p.packing.size.y, p.packing.size.z, bits));
+        fmt::format("encoding kd_tree: positions in a {} of {} x {} x {} texels take {} bits, a data node has 32",
+                    o.bindless ? "brick" : "pool", p.packing.size.x, p.packing.size.y, p.packing.size.z, bits));
 }
 
 /// Exact bytes against the limits of the context and of the user, before anything is allocated.
-void KdTree::require_sizes(const BuildRequest& request, const Plan& p) const {
+void KdTree::require_sizes(const BuildRequest& request, const Options& o, const Plan& p) const {
   const auto starts = static_cast<std::int64_t>(p.grid.nodes.size());
-  const std::array<std::pair<const char*, std::int64_t>, 5> buffers{
+  const std::int64_t bricks = o.bindless ? std::max<std::int64_t>(p.brick_count(), 1) : 0;
+  const std::array<std::pair<const char*, std::int64_t>, 8> buffers{
       {{"nodes", 8 * p.node_count()},
-       {"data nodes", 4 * std::max<std::int64_t>(p.data_words * p.leaf_count(), 1)},
+       {"handles", 8 * bricks * request.field_count()},
+       {"brick sizes", needs_brick_sizes(request, o) ? 4 * bricks : 0},
+       {"data nodes", 4 * std::max<std::int64_t>(p.data_words * p.block_count(), 1)},
+       {"levels of data nodes", request.needs.level_of_detail ? 4 * std::max<std::int64_t>(p.block_count(), 1) : 0},
        {"validity bits", 4 * p.validity_words},
        {"the start grid", 4 * static_cast<std::int64_t>(p.grid.entries.size())},
        {"the start grid's nodes", 32 * starts}}};
-  std::int64_t bytes = request.field_count() * p.packing.texels() * texel_bytes(request.storage);
+  std::int64_t bytes = request.field_count() * p.texels(o) * texel_bytes(request.storage);
   for (const auto& [what, size] : buffers) {
     if (size > request.context.max_buffer_bytes)
       throw UnsupportedError(fmt::format("encoding kd_tree: {} take {} bytes, a buffer of this context at most {}", what, size,
@@ -268,39 +352,96 @@ void KdTree::require_sizes(const BuildRequest& request, const Plan& p) const {
 
 Plan KdTree::plan(const AmrHierarchy& h, const BuildRequest& request, const Options& o) const {
   Plan p;
-  p.tree = build_tree(h);
+  p.tree = build_tree(h, {.wrap = o.wrap, .covers = o.detail, .limits = {}});
+  p.pruned = prune(h, request, o, p.tree);
+  if (o.detail) add_detail_blocks(h, p.tree);
   p.bricks = make_bricks(p.tree, p.brick_of);
   const bool validity = any_missing(h, request);
-  for (const Leaf& leaf : p.tree.leaves) {
-    p.leaf_cells += leaf.cells.cells();
-    if (validity) p.validity_words += request.field_count() * words_for_bits(leaf.cells.cells());
+  std::vector<std::uint8_t> holds_leaf(p.bricks.size());
+  for (std::size_t i = 0; i < p.tree.leaves.size(); ++i) {
+    const Leaf& block = p.tree.leaves[i];
+    const bool leaf = block.next == kNothingFiner;
+    p.leaf_count += leaf ? 1 : 0;
+    if (leaf) holds_leaf[static_cast<std::size_t>(p.brick_of[i])] = 1;
+    count_block(block, p.leaf_cells, p.detail_cells);
+    if (validity) p.validity_words += request.field_count() * words_for_bits(block.cells.cells());
   }
-  p.data_words = 1 + (request.needs.value_ranges ? 1 : 0) + (validity ? 1 : 0);
+  p.leaf_bricks = std::count(holds_leaf.begin(), holds_leaf.end(), 1);
+  p.data_words = 1 + (o.bindless ? 1 : 0) + (request.needs.value_ranges ? 1 : 0) + (validity ? 1 : 0);
+  if (o.bindless) require_handles(*this, kBindless, p.brick_count(), request);
   plan_pool(request, o, p);
   if (o.grid) {
     // of one field: the grid is the same for several
-    const std::int64_t others = p.packing.texels() * texel_bytes(request.storage) + 8 * p.node_count();
+    const std::int64_t others = p.texels(o) * texel_bytes(request.storage) + 8 * p.node_count();
     p.grid = make_start_grid(h, p.tree, std::max<std::int64_t>(others / kGridShare / 4, 1));
   }
-  require_sizes(request, p);
+  require_sizes(request, o, p);
   return p;
+}
+
+/// Texels of one or more bricks, by what they hold.
+struct TexelCounts {
+  std::int64_t all = 0;
+  std::int64_t cells = 0;    ///< of bricks; the rest are borders
+  std::int64_t leaves = 0;   ///< leaf cells among them
+  std::int64_t refined = 0;  ///< cells that are drawn for a level of detail alone
+};
+
+/// A texture of one field's values.
+HostTexture make_values(std::string name, const Vec3i& size, const EncodedField& field, const TexelCounts& n) {
+  HostTexture t = make_texture(std::move(name), field.storage, size);
+  t.hardware_linear = field.filtering == Filtering::hardware;
+  t.holds_values = true;
+  const int bytes = texel_bytes(t.format);
+  t.roles.payload = n.leaves * bytes;
+  t.roles.duplicated = (n.all - n.cells + n.refined) * bytes;
+  t.roles.padding = t.bytes() - t.roles.payload - t.roles.duplicated;
+  return t;
+}
+
+std::vector<HostTexture> make_pools(const Plan& p, const EncodedField& field) {
+  std::vector<HostTexture> pools;
+  TexelCounts n{p.brick_texels, 0, p.leaf_cells, p.detail_cells};
+  for (const Brick& b : p.bricks) n.cells += b.cells.cells();
+  for (int number = 0; number < field.field_count; ++number)
+    pools.push_back(make_values(element_name(kPoolName, number), p.packing.size, field, n));
+  return pools;
+}
+
+/// Textures of all fields of the first brick, then of the second, ...
+std::vector<HostTexture> make_brick_textures(const Options& o, const Plan& p, const EncodedField& field) {
+  std::vector<HostTexture> textures;
+  for (const Brick& b : p.bricks) {
+    const Box texels = b.texels(o);
+    TexelCounts n{texels.cells(), b.cells.cells(), 0, 0};
+    for (const int leaf : b.leaves) count_block(p.tree.leaves[static_cast<std::size_t>(leaf)], n.leaves, n.refined);
+    for (int number = 0; number < field.field_count; ++number) {
+      HostTexture& t = textures.emplace_back(make_values(kBricksName, texels.size(), field, n));
+      t.handles = kHandlesName;
+      t.handle_index = static_cast<std::int64_t>(textures.size()) - 1;
+    }
+  }
+  return textures;
+}
+
+std::uint32_t packed(const Plan& p, const Vec3i& texel) {
+  return static_cast<std::uint32_t>(texel.x) | (static_cast<std::uint32_t>(texel.y) << p.position_bits.x) |
+         (static_cast<std::uint32_t>(texel.z) << (p.position_bits.x + p.position_bits.y));
+}
+
+void add_handles(const BuildRequest& request, const Options& o, const Plan& p, EncodedField& field) {
+  field.textures.push_back(make_buffer(kHandlesName, TexelFormat::rg32ui, p.brick_count() * field.field_count));
+  if (!needs_brick_sizes(request, o)) return;
+  HostTexture& sizes = field.textures.emplace_back(make_buffer("kd_brick_sizes", TexelFormat::r32ui, p.brick_count()));
+  auto* words = sizes.as<std::uint32_t>();
+  for (const Brick& b : p.bricks) *words++ = packed(p, b.texels(o).size() - Vec3i(1));
 }
 
 Stores make_stores(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& p,
                    const EncodedField& field) {
   Stores out;
-  for (int number = 0; number < field.field_count; ++number) {
-    HostTexture& pool = out.pools.emplace_back(make_texture(element_name("tex_kd_pool", number), field.storage, p.packing.size));
-    pool.hardware_linear = field.filtering == Filtering::hardware;
-    pool.holds_values = true;
-    std::int64_t cells = 0;
-    for (const Brick& b : p.bricks) cells += b.cells.cells();
-    const int bytes = texel_bytes(pool.format);
-    pool.roles.payload = p.leaf_cells * bytes;
-    pool.roles.duplicated = (p.brick_texels - cells) * bytes;
-    pool.roles.padding = pool.bytes() - pool.roles.payload - pool.roles.duplicated;
-  }
-  out.data = make_buffer("kd_data", TexelFormat::r32ui, p.data_words * p.leaf_count());
+  out.values = o.bindless ? make_brick_textures(o, p, field) : make_pools(p, field);
+  out.data = make_buffer("kd_data", TexelFormat::r32ui, p.data_words * p.block_count());
   const bool validity = any_missing(h, request);
   if (validity) out.validity = make_buffer("kd_validity", TexelFormat::r32ui, p.validity_words);
   auto* words = out.data.as<std::uint32_t>();
@@ -309,8 +450,8 @@ Stores make_stores(const AmrHierarchy& h, const BuildRequest& request, const Opt
     const Leaf& leaf = p.tree.leaves[i];
     const auto brick = static_cast<std::size_t>(p.brick_of[i]);
     const Vec3i at = p.packing.at[brick] + leaf.cells.lower - p.bricks[brick].texels(o).lower;
-    words[0] = static_cast<std::uint32_t>(at.x) | (static_cast<std::uint32_t>(at.y) << p.position_bits.x) |
-               (static_cast<std::uint32_t>(at.z) << (p.position_bits.x + p.position_bits.y));
+    words[0] = packed(p, at);
+    if (o.bindless) words[1] = static_cast<std::uint32_t>(brick);
     if (!validity) continue;
     words[p.data_words - 1] = static_cast<std::uint32_t>(first_word_of_leaf);
     first_word_of_leaf += request.field_count() * words_for_bits(leaf.cells.cells());
@@ -336,6 +477,12 @@ HostTexture make_nodes(const Tree& tree) {
     *words++ = second_word(n);
   }
   return nodes;
+}
+
+HostTexture make_detail(const Tree& tree) {
+  HostTexture detail = make_buffer("kd_detail", TexelFormat::r32ui, static_cast<std::int64_t>(tree.leaves.size()));
+  std::transform(tree.leaves.begin(), tree.leaves.end(), detail.as<std::uint32_t>(), detail_word);
+  return detail;
 }
 
 void add_start_grid(const AmrHierarchy& h, const Plan& p, EncodedField& field) {
@@ -366,6 +513,8 @@ void add_defines(const Options& o, const Plan& p, EncodedField& field) {
   defines.emplace_back("AMRTEX_KD_DATA_WORDS", p.data_words);
   defines.emplace_back("AMRTEX_KD_X_BITS", p.position_bits.x);
   defines.emplace_back("AMRTEX_KD_Y_BITS", p.position_bits.y);
+  defines.emplace_back("AMRTEX_KD_BINDLESS", o.bindless ? 1 : 0);
+  if (o.bindless) return;
   defines.emplace_back("AMRTEX_POOL_X", p.packing.size.x);
   defines.emplace_back("AMRTEX_POOL_Y", p.packing.size.y);
   defines.emplace_back("AMRTEX_POOL_Z", p.packing.size.z);
@@ -373,20 +522,22 @@ void add_defines(const Options& o, const Plan& p, EncodedField& field) {
 
 Json statistics(const Options& o, const Plan& p) {
   const Tree& t = p.tree;
-  const auto bricks = static_cast<double>(std::max<std::size_t>(p.bricks.size(), 1));
   Json json;
   json["nodes"] = p.node_count();
   json["fully_refined_nodes"] = t.fully_refined;
   json["mixed_nodes"] = t.mixed;
-  json["leaves"] = p.leaf_count();
+  json["leaves"] = p.leaf_count;
   json["empty_leaves"] = t.empty;
+  if (o.detail) json["detail_blocks"] = p.block_count() - p.leaf_count;
+  json["pruned_leaves"] = p.pruned.leaves;
+  json["pruned_bricks"] = p.pruned.bricks;
   json["depth"] = t.depth;
   json["subgrids"] = t.subgrids;
   json["cut_subgrids"] = t.cut_subgrids;
   json["bricks"] = p.bricks.size();
-  json["leaves_a_brick"] = static_cast<double>(p.leaf_count()) / bricks;
-  json["pool"] = {p.packing.size.x, p.packing.size.y, p.packing.size.z};
-  json["fill"] = static_cast<double>(p.brick_texels) / static_cast<double>(p.packing.texels());
+  json["leaves_a_brick"] = static_cast<double>(p.leaf_count) / static_cast<double>(std::max<std::int64_t>(p.leaf_bricks, 1));
+  json["pool"] = o.bindless ? Json(nullptr) : Json{p.packing.size.x, p.packing.size.y, p.packing.size.z};
+  json["fill"] = static_cast<double>(p.brick_texels) / static_cast<double>(std::max<std::int64_t>(p.texels(o), 1));
   json["start_grid"] = o.grid ? Json{p.grid.cells.x, p.grid.cells.y, p.grid.cells.z} : Json(nullptr);
   json["start_depth"] = o.grid ? p.grid.depth : t.depth;
   return json;
@@ -394,7 +545,7 @@ Json statistics(const Options& o, const Plan& p) {
 
 /// Texels of subgrids that others refine everywhere, and of the parts of others around which no leaf cell lies.
 std::int64_t undrawn_cells(const AmrHierarchy& h, const Plan& p) {
-  std::int64_t cells = h.stored_cells();
+  std::int64_t cells = h.stored_cells() - p.pruned.brick_cells;
   for (const Brick& b : p.bricks) cells -= b.cells.cells();
   return cells;
 }
@@ -402,12 +553,15 @@ std::int64_t undrawn_cells(const AmrHierarchy& h, const Plan& p) {
 std::vector<LeftOut> left_out(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& p) {
   std::vector<LeftOut> list;
   const std::int64_t value_bytes = std::int64_t{request.field_count()} * texel_bytes(request.storage);
+  if (p.pruned.leaves > 0)
+    list.push_back({"leaves, and what they leave of bricks", "the transfer function hides all that is in them",
+                    p.pruned.brick_texels * value_bytes + 4 * p.data_words * p.pruned.leaves});
   if (!any_missing(h, request)) {
-    std::int64_t words = p.leaf_count();
+    std::int64_t words = p.block_count();
     for (const Leaf& leaf : p.tree.leaves) words += request.field_count() * words_for_bits(leaf.cells.cells());
     list.push_back({"validity bits", "every cell has a value", 4 * words});
   }
-  if (!request.needs.value_ranges) list.push_back({"value ranges", "no region is skipped", 4 * p.leaf_count()});
+  if (!request.needs.value_ranges) list.push_back({"value ranges", "no region is skipped", 4 * p.block_count()});
   if (const std::int64_t cells = undrawn_cells(h, p); cells > 0)
     list.push_back({"refined parts of subgrids", "no level of detail is drawn", cells * value_bytes});
   if (!o.vertices && o.border == 0) {
@@ -422,9 +576,7 @@ EncodedField KdTree::build(const AmrHierarchy& h, const BuildRequest& request) c
   require_filter(*this, request.needs.filter);
   require_fields(*this, h, request);
   const Json parameters = complete_parameters(*this, request.parameters);
-  const Options o = options(parameters, request.needs.filter);
-  if (parameters.at("storage_kind") == "bindless")
-    throw UnsupportedError("encoding kd_tree: storage_kind bindless is not available in this version; accepted: pool");
+  const Options o = options(parameters, request.needs);
   const Plan p = plan(h, request, o);
 
   EncodedField field = start_field(*this, h, request, parameters);
@@ -434,10 +586,17 @@ EncodedField KdTree::build(const AmrHierarchy& h, const BuildRequest& request) c
   field.left_out = left_out(h, request, o, p);
   field.textures.push_back(make_nodes(p.tree));
   field.textures.push_back(std::move(stores.data));
+  if (o.detail) field.textures.push_back(make_detail(p.tree));
   if (o.grid) add_start_grid(h, p, field);
-  for (HostTexture& pool : stores.pools) field.textures.push_back(std::move(pool));
+  if (o.bindless) {
+    add_handles(request, o, p, field);
+    add_handle_access(request.context, field);
+  }
+  for (HostTexture& texture : stores.values) field.textures.push_back(std::move(texture));
   if (!stores.validity.data.empty()) field.textures.push_back(std::move(stores.validity));
-  field.host_peak_bytes = field.memory().total() + static_cast<std::int64_t>(p.tree.nodes.size() * (sizeof(Node) + sizeof(Box)));
+  if (request.needs.draw_boxes) field.draw_tree = make_draw_tree(h, p.tree);
+  field.host_peak_bytes = field.memory().total() + static_cast<std::int64_t>(p.tree.nodes.size() * (sizeof(Node) + sizeof(Box))) +
+                          field.draw_tree.bytes();
   return field;
 }
 

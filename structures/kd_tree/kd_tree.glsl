@@ -1,4 +1,4 @@
-// kd_tree: a descent a region, one filtered fetch a sample and field. Words: kd_tree_layout.h.
+// kd_tree: a descent a region, one filtered fetch a sample and field, from the pool or from the brick's own texture. Words: kd_tree_layout.h.
 #include "kd_tree/kd_tree_layout.h"
 #if !AMRTEX_CPP
 #ifndef AMRTEX_KD_DEPTH
@@ -16,8 +16,17 @@
 #ifndef AMRTEX_KD_X_BITS
 #error AMRTEX_KD_X_BITS and AMRTEX_KD_Y_BITS must be defined: bits of x and y in a packed position
 #endif
+#ifndef AMRTEX_KD_BINDLESS
+#error AMRTEX_KD_BINDLESS must be defined: 1 where each brick has its own texture, 0 where all are in the pool
+#endif
+#if AMRTEX_KD_BINDLESS
+#ifndef AMRTEX_HANDLE_TURNS
+#error AMRTEX_HANDLE_TURNS must be defined: handles that invocations which run together may hold, 1 where a fetch takes different ones
+#endif
+#else
 #ifndef AMRTEX_POOL_X
 #error AMRTEX_POOL_X, _Y and _Z must be defined: texels of the pool along each axis
+#endif
 #endif
 #endif
 DEFINE_INT(AMRTEX_KD_DEPTH)
@@ -26,6 +35,8 @@ DEFINE_INT(AMRTEX_KD_VERTICES)
 DEFINE_INT(AMRTEX_KD_DATA_WORDS)
 DEFINE_INT(AMRTEX_KD_X_BITS)
 DEFINE_INT(AMRTEX_KD_Y_BITS)
+DEFINE_INT(AMRTEX_KD_BINDLESS)
+DEFINE_INT(AMRTEX_HANDLE_TURNS)
 DEFINE_INT(AMRTEX_POOL_X)
 DEFINE_INT(AMRTEX_POOL_Y)
 DEFINE_INT(AMRTEX_POOL_Z)
@@ -38,7 +49,18 @@ BUFFER(uvec4, kd_start_nodes, kd_start_nodes_block)  // two a node: (lower corne
 UNIFORM(ivec3, u_kd_grid)                            // cells of the grid
 UNIFORM(ivec3, u_kd_grid_width)                      // x: width of a cell of the grid, finest cells
 #endif
+#if AMRTEX_CPP || !AMRTEX_KD_BINDLESS
 VALUE_TEXTURES(tex_kd_pool, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)
+#endif
+#if AMRTEX_CPP || AMRTEX_KD_BINDLESS
+VALUE_TEXTURE_SET(tex_kd_bricks, kd_handles, kd_handles_block)  // AMRTEX_FIELDS textures a brick
+#endif
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING && AMRTEX_KD_BINDLESS
+BUFFER(uint, kd_brick_sizes, kd_brick_sizes_block)  // last texel of each brick
+#endif
+#if AMRTEX_CPP || AMRTEX_LEVEL_OF_DETAIL
+BUFFER(uint, kd_detail, kd_detail_block)  // a word a data node: its cells, and what takes their place
+#endif
 #if AMRTEX_CPP || AMRTEX_VALIDITY
 BUFFER(uint, kd_validity, kd_validity_block)  // one bit a cell, each field of each data node from a new word
 #endif
@@ -69,10 +91,37 @@ int kd_begin(IN(ivec3) cell, INOUT(Region) r) {
 
 int kd_component(IN(ivec3) v, IN(int) axis) { return axis == 0 ? v.x : (axis == 1 ? v.y : v.z); }
 
-// The leaf that holds a cell; r.lower and r.upper become its box.
-uvec2 kd_find_leaf(IN(ivec3) cell, INOUT(Region) r) {
+#if AMRTEX_CPP || AMRTEX_LEVEL_OF_DETAIL
+// The coarsest data node of a node with box r that suffices, and its level; AMRTEX_KD_NO_DATA where none does. A leaf's own always does:
+// nothing takes its place.
+int kd_sufficient(IN(uvec2) node, INOUT(Region) r) {
+  int data = kd_data_index(node);
+  bool more = data != AMRTEX_KD_NO_DATA;
+  int i = 0;
+  if (more) {
+    do {
+      uint word = kd_detail[data + i];
+      int next = int((word >> uint(AMRTEX_KD_LEVEL_BITS)) & uint((2 << AMRTEX_KD_LEVEL_BITS) - 1));
+      r.level = int(word & uint((1 << AMRTEX_KD_LEVEL_BITS) - 1));
+      if (level_suffices(r.lower, r.upper, r.level, next)) return data + i;
+      more = ((word >> uint(AMRTEX_KD_DETAIL_LAST_BIT)) & 1u) == 0u;
+      i += 1;
+    } while (more && i < AMRTEX_LEVELS);
+  }
+  return AMRTEX_KD_NO_DATA;
+}
+#endif
+
+// The leaf that holds a cell, or the node above it that is drawn in its place. r receives its box and level; `data`: its data node.
+void kd_find_leaf(IN(ivec3) cell, INOUT(Region) r, OUT(int) data) {
   uvec2 node = kd_nodes[kd_begin(cell, r)];
   int child = kd_first_child(node);
+  data = AMRTEX_KD_NO_DATA;
+#if AMRTEX_CPP || AMRTEX_LEVEL_OF_DETAIL
+  r.level = kd_level(node);
+  if (AMRTEX_LEVEL_OF_DETAIL != 0) data = kd_sufficient(node, r);
+  if (data != AMRTEX_KD_NO_DATA) child = 0;
+#endif
   int steps = 0;
   if (child != 0) {
     do {
@@ -86,35 +135,58 @@ uvec2 kd_find_leaf(IN(ivec3) cell, INOUT(Region) r) {
       node = kd_nodes[child + (above ? 1 : 0)];
       child = kd_first_child(node);
       steps += 1;
+#if AMRTEX_CPP || AMRTEX_LEVEL_OF_DETAIL
+      r.level = kd_level(node);
+      if (AMRTEX_LEVEL_OF_DETAIL != 0) data = kd_sufficient(node, r);
+      if (data != AMRTEX_KD_NO_DATA) child = 0;
+#endif
     } while (child != 0 && steps < AMRTEX_KD_DEPTH);
   }
-  return node;
+  if (AMRTEX_LEVEL_OF_DETAIL == 0) {
+    r.level = kd_level(node);
+    data = kd_data_index(node);
+  }
 }
 
-ivec3 kd_pool_position(IN(uint) position) {
+// A packed texel of the pool or of a brick.
+ivec3 kd_texel_position(IN(uint) position) {
   return ivec3(int(position & ((1u << uint(AMRTEX_KD_X_BITS)) - 1u)),
                int((position >> uint(AMRTEX_KD_X_BITS)) & ((1u << uint(AMRTEX_KD_Y_BITS)) - 1u)),
                int(position >> uint(AMRTEX_KD_X_BITS + AMRTEX_KD_Y_BITS)));
 }
 
 bool locate(IN(Position) p, OUT(Region) r) {
-  uvec2 node = kd_find_leaf(p.cell, r);
-  r.level = kd_level(node);
+  int data = AMRTEX_KD_NO_DATA;
+  kd_find_leaf(p.cell, r, data);
   r.width = level_width(r.level);
   r.value_range = vec2r(0);
   r.handle = ivec4(0);
+  r.brick = uvec4(0u);
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+#if AMRTEX_KD_BINDLESS
+  r.texture_scale = vec3r(0);
+#else
   r.texture_scale = vec3r(1.0 / float(AMRTEX_POOL_X), 1.0 / float(AMRTEX_POOL_Y), 1.0 / float(AMRTEX_POOL_Z));
+#endif
   r.texture_lower = vec3r(0);
 #endif
-  int data = kd_data_index(node);
   if (data == AMRTEX_KD_NO_DATA) return false;
   data *= AMRTEX_KD_DATA_WORDS;
-  ivec3 texel = kd_pool_position(kd_data[data]);
+  ivec3 texel = kd_texel_position(kd_data[data]);
   r.handle = ivec4(texel.x, texel.y, texel.z, 0);
-  if (AMRTEX_VALUE_RANGES != 0) r.value_range = decode_range(kd_data[data + 1]);
+#if AMRTEX_CPP || AMRTEX_KD_BINDLESS
+  if (AMRTEX_KD_BINDLESS != 0) {
+    uint number = kd_data[data + 1];
+    uvec2 brick = kd_handles[int(number) * AMRTEX_FIELDS];  // once a region; of field 0
+    r.brick = uvec4(brick.x, brick.y, number, 0u);
+  }
+#endif
+  if (AMRTEX_VALUE_RANGES != 0) r.value_range = decode_range(kd_data[data + 1 + AMRTEX_KD_BINDLESS]);
   if (AMRTEX_VALIDITY != 0) r.handle.w = int(kd_data[data + AMRTEX_KD_DATA_WORDS - 1]);
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+#if AMRTEX_KD_BINDLESS
+  r.texture_scale = vec3r(1) / vec3r(kd_texel_position(kd_brick_sizes[r.brick.z]) + ivec3(1));
+#endif
   // a cell's centre is its texel's; a vertex sits on the corner, half a texel from its own
   r.texture_lower = (vec3r(texel) + (AMRTEX_KD_VERTICES != 0 ? vec3r(0.5) : vec3r(0))) * r.texture_scale;
 #endif
@@ -134,16 +206,96 @@ bool kd_has_value(IN(Region) r, IN(int) field, IN(ivec3) cell) {
 }
 #endif
 
-real kd_texel(IN(int) field, IN(ivec3) texel) { return texelFetch(tex_kd_pool[field], texel, 0).x; }
+#if AMRTEX_CPP || AMRTEX_KD_BINDLESS
+uvec2 kd_brick(IN(Region) r, IN(int) field) {
+  if (field == 0) return uvec2(r.brick.x, r.brick.y);
+  return kd_handles[int(r.brick.z) * AMRTEX_FIELDS + field];
+}
+
+real kd_brick_texel(IN(uvec2) brick, IN(ivec3) i) {
+  real value = real(0);
+  bool waits = true;
+  for (int turn = 0; waits && turn < AMRTEX_HANDLE_TURNS; ++turn) {
+    uvec2 served = SERVED_HANDLE(brick);
+    if (served == brick) {
+      value = SET_TEXEL(tex_kd_bricks, served, i).x;
+      waits = false;
+    }
+  }
+  return value;
+}
+
+// All eight in one turn.
+void kd_brick_corners(IN(uvec2) brick, IN(ivec3) i, OUT(vec4r) lower, OUT(vec4r) upper) {
+  lower = vec4r(0);
+  upper = vec4r(0);
+  bool waits = true;
+  for (int turn = 0; waits && turn < AMRTEX_HANDLE_TURNS; ++turn) {
+    uvec2 served = SERVED_HANDLE(brick);
+    if (served == brick) {
+      lower = vec4r(SET_TEXEL(tex_kd_bricks, served, i).x, SET_TEXEL(tex_kd_bricks, served, i + ivec3(1, 0, 0)).x,
+                    SET_TEXEL(tex_kd_bricks, served, i + ivec3(0, 1, 0)).x, SET_TEXEL(tex_kd_bricks, served, i + ivec3(1, 1, 0)).x);
+      upper = vec4r(SET_TEXEL(tex_kd_bricks, served, i + ivec3(0, 0, 1)).x, SET_TEXEL(tex_kd_bricks, served, i + ivec3(1, 0, 1)).x,
+                    SET_TEXEL(tex_kd_bricks, served, i + ivec3(0, 1, 1)).x, SET_TEXEL(tex_kd_bricks, served, i + ivec3(1, 1, 1)).x);
+      waits = false;
+    }
+  }
+}
+#endif
+
+real kd_texel(IN(Region) r, IN(int) field, IN(ivec3) i) {
+  real value = real(0);
+#if AMRTEX_CPP || AMRTEX_KD_BINDLESS
+  if (AMRTEX_KD_BINDLESS != 0) value = kd_brick_texel(kd_brick(r, field), i);
+#endif
+#if AMRTEX_CPP || !AMRTEX_KD_BINDLESS
+  if (AMRTEX_KD_BINDLESS == 0) value = texelFetch(tex_kd_pool[field], i, 0).x;
+#endif
+  return value;
+}
+
+// The texels i + (0 or 1) along each axis, x fastest.
+void kd_corners(IN(Region) r, IN(int) field, IN(ivec3) i, OUT(vec4r) lower, OUT(vec4r) upper) {
+#if AMRTEX_CPP || AMRTEX_KD_BINDLESS
+  if (AMRTEX_KD_BINDLESS != 0) {
+    kd_brick_corners(kd_brick(r, field), i, lower, upper);
+    return;
+  }
+#endif
+  lower = vec4r(kd_texel(r, field, i), kd_texel(r, field, i + ivec3(1, 0, 0)), kd_texel(r, field, i + ivec3(0, 1, 0)),
+                kd_texel(r, field, i + ivec3(1, 1, 0)));
+  upper = vec4r(kd_texel(r, field, i + ivec3(0, 0, 1)), kd_texel(r, field, i + ivec3(1, 0, 1)),
+                kd_texel(r, field, i + ivec3(0, 1, 1)), kd_texel(r, field, i + ivec3(1, 1, 1)));
+}
+
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+real kd_filtered(IN(Region) r, IN(int) field, IN(vec3r) uvw) {
+#if AMRTEX_KD_BINDLESS
+  uvec2 brick = kd_brick(r, field);
+  real value = real(0);
+  bool waits = true;
+  for (int turn = 0; waits && turn < AMRTEX_HANDLE_TURNS; ++turn) {
+    uvec2 served = SERVED_HANDLE(brick);
+    if (served == brick) {
+      value = SET_FILTERED(tex_kd_bricks, served, uvw).x;
+      waits = false;
+    }
+  }
+  return value;
+#else
+  return textureLod(tex_kd_pool[field], uvw, 0.0).x;
+#endif
+}
+#endif
 
 real kd_stored_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
   ivec3 first = ivec3(r.handle.x, r.handle.y, r.handle.z);
   if (AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) {
     ivec3 cell = clamp(ivec3(floor(q)), ivec3(0), kd_cells(r) - ivec3(1));
-    return decode_value(kd_texel(field, first + cell), field);
+    return decode_value(kd_texel(r, field, first + cell), field);
   }
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
-  return decode_value(textureLod(tex_kd_pool[field], r.texture_lower + q * r.texture_scale, 0.0).x, field);
+  return decode_value(kd_filtered(r, field, r.texture_lower + q * r.texture_scale), field);
 #else
   // counted from the vertex, or from the centre of the cell before the region
   PRECISE vec3r from_first = AMRTEX_KD_VERTICES != 0 ? q : q + vec3r(0.5);
@@ -151,10 +303,10 @@ real kd_stored_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
   vec3r whole = clamp(floor(from_first), vec3r(0), vec3r(kd_cells(r) - ivec3(last)));
   vec3r f = from_first - whole;
   ivec3 i = first + ivec3(whole) - ivec3(1 - last);
-  return decode_value(trilinear(kd_texel(field, i), kd_texel(field, i + ivec3(1, 0, 0)), kd_texel(field, i + ivec3(0, 1, 0)),
-                                kd_texel(field, i + ivec3(1, 1, 0)), kd_texel(field, i + ivec3(0, 0, 1)),
-                                kd_texel(field, i + ivec3(1, 0, 1)), kd_texel(field, i + ivec3(0, 1, 1)),
-                                kd_texel(field, i + ivec3(1, 1, 1)), f), field);
+  vec4r lower;
+  vec4r upper;
+  kd_corners(r, field, i, lower, upper);
+  return decode_value(trilinear(lower.x, lower.y, lower.z, lower.w, upper.x, upper.y, upper.z, upper.w, f), field);
 #endif
 }
 

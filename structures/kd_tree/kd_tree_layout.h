@@ -10,9 +10,16 @@
 //   The second child is the node after the first. `split` is where the plane lies, in cells of the node's level from
 //   the node's lower corner. The first child is the one below the plane.
 //
-// A data node, AMRTEX_KD_DATA_WORDS words: where the texel of the node's lower cell (or vertex) lies in the pool, x in
-// the lowest bits, then y and z; then its coded value range, where regions are skipped; then its first word of validity
+// A data node, AMRTEX_KD_DATA_WORDS words: where the texel of the node's lower cell (or vertex) lies in the pool or its
+// brick, x in the lowest bits, then y and z; then the number of its brick (bindless); then its coded value range, where regions are skipped; then its first word of validity
 // bits, where cells may have no value.
+//
+// With a level of detail, a node's data nodes stand one behind the other, the coarsest first: cells that are refined and
+// may be drawn in place of what lies below, then a leaf's own. Each has a word in kd_detail:
+//
+//   13        12          6 5       0
+//   [ last    ][ next     ][ level   ]   next: the coarsest level that takes the cells' place; 2^6: none. last: of the node
+#define AMRTEX_KD_DETAIL_LAST_BIT 13
 #define AMRTEX_KD_CHILD_BITS 24
 #define AMRTEX_KD_LEVEL_BITS 6
 #define AMRTEX_KD_DATA_BITS 20

@@ -3,15 +3,18 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <chrono>
 
 #include "renderers/raycaster.hpp"
 #include "structures/brick_packing.hpp"
+#include "structures/kd_tree/kd_detail.hpp"
 #include "structures/kd_tree/kd_partition.hpp"
 #include "structures/kd_tree/start_grid.hpp"
 #include "structures/random_mesh.hpp"
 #include "structures/synthetic.hpp"
+#include "structures/texture_handles.hpp"
 #include "tests/encoding_cases.hpp"
 
 namespace amrtex {
@@ -76,7 +79,7 @@ TEST(KdTree, NodesHoldWhatTheLayoutSays) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const AmrHierarchy h(random_mesh(seed));
     const kd::Tree tree = kd::build_tree(h);
-    const EncodedField field = kd_field(h, Filter::nearest);
+    const EncodedField field = kd_field(h, Filter::nearest, {{"wrap", false}});
     ASSERT_EQ(field.find("kd_nodes")->texels(), static_cast<std::int64_t>(tree.nodes.size()));
     for (std::size_t i = 0; i < tree.nodes.size(); ++i) {
       const kd::Node& n = tree.nodes[i];
@@ -194,23 +197,142 @@ TEST(KdTree, EveryLeafCellOfRandomMeshesLiesInOneDrawnNodeOfItsLevel) {
   }
 }
 
-TEST(KdTree, TenThousandSubgridsTakeSeconds) {
-  // every other block of a checkerboard is refined: 10 976 subgrids of 4^3 cells, none beside another
-  MeshBuilder mesh(Vec3i(56), {2});
+/// Every other block of a checkerboard is refined: blocks^3 / 2 subgrids of 4^3 cells, none beside another.
+AmrHierarchy checkerboard(int blocks) {
+  MeshBuilder mesh(Vec3i(2 * blocks), {2});
   mesh.root(constant(1));
-  int subgrids = 0;
-  for_each_cell({Vec3i(0), Vec3i(28)}, [&](const Vec3i& b) {
+  for_each_cell({Vec3i(0), Vec3i(blocks)}, [&](const Vec3i& b) {
     if ((b.x + b.y + b.z) % 2 == 0) mesh.patch(1, {b * 4, (b + 1) * 4}, constant(2));
-    subgrids += (b.x + b.y + b.z) % 2 == 0 ? 1 : 0;
   });
-  const AmrHierarchy h = mesh.hierarchy();
-  ASSERT_EQ(subgrids, 10976);
+  return mesh.hierarchy();
+}
+
+TEST(KdTree, ThePartitionDoesNotDependOnThreads) {
+  const AmrHierarchy h = checkerboard(20);
+  const auto nodes = [&](std::size_t threads, bool covers) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    kd::Tree tree = kd::build_tree(h, {.wrap = false, .covers = covers, .limits = {}});
+    if (covers) kd::add_detail_blocks(h, tree);
+    std::vector<std::uint32_t> words;
+    for (const kd::Node& n : tree.nodes) words.insert(words.end(), {kd::first_word(n), kd::second_word(n)});
+    for (const kd::Leaf& l : tree.leaves) words.insert(words.end(), {kd::detail_word(l), static_cast<std::uint32_t>(l.patch)});
+    return words;
+  };
+  for (const bool covers : {false, true}) EXPECT_EQ(nodes(1, covers), nodes(4, covers));
+}
+
+TEST(KdTree, TenThousandSubgridsTakeSeconds) {
+  const AmrHierarchy h = checkerboard(28);
+  ASSERT_EQ(h.patches(1).size(), 10976U);
   const auto start = std::chrono::steady_clock::now();
   const kd::Tree tree = kd::build_tree(h);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   EXPECT_LT(seconds.count(), 5);
   EXPECT_LE(tree.depth, 64);
   RecordProperty("milliseconds", static_cast<int>(1000 * seconds.count()));
+}
+
+// ---- wrapping
+
+/// Leaf blocks, after a check that they hold each leaf cell of the mesh once.
+std::size_t leaves_of(const AmrHierarchy& h, bool wrap) {
+  const kd::Tree tree = kd::build_tree(h, {.wrap = wrap, .covers = false, .limits = {}});
+  std::int64_t cells = 0;
+  for (const kd::Leaf& leaf : tree.leaves) {
+    const Box& patch = h.patches(leaf.level)[static_cast<std::size_t>(leaf.patch)].box;
+    EXPECT_TRUE(patch.contains(leaf.cells));
+    const auto mask = h.leaf_mask(leaf.level, leaf.patch);
+    for_each_cell(leaf.cells, [&](const Vec3i& c) {
+      EXPECT_EQ(mask[patch.offset(c)], 1);
+      ++cells;
+    });
+  }
+  EXPECT_EQ(cells, h.leaf_cells());  // nodes divide the domain: each once
+  return tree.leaves.size();
+}
+
+TEST(KdTree, WrappingSavesLeavesWhereSubgridsLieTogether) {
+  // after figure 9 of Kaehler & Hege 2002: a row of subgrids in the middle of a large region. The planes between them cut the
+  // region around into as many parts; its six sides first leave the subgrids' own box alone.
+  MeshBuilder mesh({24, 12, 12}, {2});
+  mesh.root(waves);
+  for (int i = 0; i < 5; ++i) mesh.patch(1, {{8 + 6 * i, 8, 8}, {14 + 6 * i, 16, 16}}, waves);
+  const AmrHierarchy h = mesh.hierarchy();
+  EXPECT_EQ(leaves_of(h, true), 6U + 5U);
+  EXPECT_GT(leaves_of(h, false), 11U);
+  EXPECT_EQ(kd_field(h, Filter::nearest, {{"wrap", true}}).statistics["leaves"], 11);
+}
+
+TEST(KdTree, WrappedLeavesStillPartitionRandomMeshesAndAreFewer) {
+  std::size_t wrapped = 0;
+  std::size_t plain = 0;
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    SCOPED_TRACE(seed);
+    const AmrHierarchy h(random_mesh(seed));
+    wrapped += leaves_of(h, true);
+    plain += leaves_of(h, false);
+  }
+  EXPECT_LE(wrapped, plain) << "in all; a single mesh may have more";
+}
+
+// ---- level of detail
+
+TEST(KdTree, DetailBlocksAreTheRefinedCellsOfEachSubgridOnce) {
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    SCOPED_TRACE(seed);
+    const AmrHierarchy h(random_mesh(seed));
+    kd::Tree tree = kd::build_tree(h, {.wrap = false, .covers = true, .limits = {}});
+    kd::add_detail_blocks(h, tree);
+    const std::vector<Box> boxes = kd::node_boxes(h, tree);
+    std::int64_t cells = 0;
+    for (std::size_t i = 0; i < tree.nodes.size(); ++i) {
+      if (tree.nodes[i].leaf < 0) continue;
+      for (auto k = static_cast<std::size_t>(tree.nodes[i].leaf);; ++k) {
+        const kd::Leaf& block = tree.leaves[k];
+        const Box& patch = h.patches(block.level)[static_cast<std::size_t>(block.patch)].box;
+        EXPECT_EQ(block.cells.refined(h.cell_width(block.level)), boxes[i]) << "whole cells";
+        EXPECT_TRUE(patch.contains(block.cells));
+        EXPECT_GT(block.next, block.level);
+        const auto mask = h.leaf_mask(block.level, block.patch);
+        const bool leaf = block.next == kd::kNothingFiner;
+        for_each_cell(block.cells, [&](const Vec3i& c) { EXPECT_EQ(mask[patch.offset(c)] != 0, leaf); });
+        if (!block.repeated) cells += block.cells.cells();
+        EXPECT_EQ(leaf, block.last && tree.nodes[i].first_child == 0);
+        if (block.last) break;
+      }
+    }
+    // a cell that several subgrids of a much finer level share is drawn at no node where their face divides it
+    EXPECT_LE(cells, h.stored_cells());
+    EXPECT_GE(cells, h.leaf_cells());
+    const kd::StartGrid grid = kd::make_start_grid(h, tree, 1000);
+    for (const std::uint32_t node : grid.nodes) {  // no start below a node that may be drawn
+      for (std::size_t i = 0; i < tree.nodes.size(); ++i)
+        EXPECT_FALSE(i != node && tree.nodes[i].leaf >= 0 && tree.nodes[i].first_child != 0 && boxes[i].contains(boxes[node]) &&
+                     boxes[i] != boxes[node]);
+    }
+  }
+}
+
+TEST(KdTree, DetailOfAHandMadeMesh) {
+  // the whole root is refined by two subgrids: one block of the root's 4 x 2 x 2 cells, two leaves
+  const AmrHierarchy covered = MeshBuilder({4, 2, 2}, {2})
+                                   .root(waves)
+                                   .patch(1, {{0, 0, 0}, {4, 4, 4}}, waves)
+                                   .patch(1, {{4, 0, 0}, {8, 4, 4}}, waves)
+                                   .hierarchy();
+  const EncodedField field = kd_field(covered, Filter::nearest, Json::object(), {.level_of_detail = true});
+  EXPECT_EQ(field.statistics["detail_blocks"], 1);
+  EXPECT_EQ(field.statistics["leaves"], 2);
+  EXPECT_EQ(field.statistics["leaves_a_brick"], 1.0) << "the root's brick holds no leaf";
+  EXPECT_EQ(field.statistics["bricks"], 3);
+  EXPECT_EQ(field.find("tex_kd_pool")->roles.payload, 4 * 2 * 64);
+  EXPECT_EQ(field.find("tex_kd_pool")->roles.duplicated, 4 * 16);
+  const auto* words = field.find("kd_detail")->as<std::uint32_t>();
+  EXPECT_EQ(words[0], 0U | (1U << 6) | (1U << 13)) << "level 0, refined by 1, alone in its node";
+  EXPECT_EQ(words[1], 1U | (64U << 6) | (1U << 13)) << "level 1, refined by nothing";
+  const EncodedField without = kd_field(covered, Filter::nearest);
+  EXPECT_EQ(without.find("kd_detail"), nullptr);
+  EXPECT_EQ(without.statistics["bricks"], 2);
 }
 
 // ---- the pool
@@ -339,18 +461,36 @@ TEST(KdTree, TraversalsAndPackingsGiveTheSameBits) {
   }
 }
 
+TEST(KdTree, TreesWithoutWrappingHoldTheSameField) {
+  for (std::uint64_t seed = 0; seed < 24; ++seed) {
+    SCOPED_TRACE(seed);
+    const AmrHierarchy h(random_mesh(seed));
+    const auto positions = probe_positions(h, 20, seed);
+    for (const Filter filter : {Filter::nearest, Filter::linear_lod, Filter::linear_vertex}) {
+      const Comparison result = compare_double(h, kd_field(h, filter, {{"wrap", false}}, {.storage = Storage::r64f}), positions);
+      EXPECT_TRUE(result) << result;
+    }
+  }
+}
+
+/// The whole mesh from an oblique side, values above 1/2 visible.
+Scene oblique_scene(const AmrHierarchy& h, int width, int height) {
+  Scene scene;
+  const Vec3d middle = (h.domain_lower() + h.domain_upper()) * 0.5;
+  scene.view.eye = middle + (h.domain_upper() - h.domain_lower()) * Vec3d(1.1, -1.7, 0.8);
+  scene.view.at = middle;
+  scene.transfer_function.extinction = {{0.5, 0}, {1, 20}};
+  scene.transfer_function.color = {{0, {1, 0.2, 0}}, {1, {0, 0.5, 1}}};
+  scene.settings.width = width;
+  scene.settings.height = height;
+  return scene;
+}
+
 TEST(KdTree, TraversalsGiveTheSamePicture) {
   Context& gl = context(ContextKind::egl);
   for (const MeshBuilder& mesh : {nested(waves), holes_and_missing(waves, 3)}) {
     const AmrHierarchy h = mesh.hierarchy();
-    Scene scene;
-    const Vec3d middle = (h.domain_lower() + h.domain_upper()) * 0.5;
-    scene.view.eye = middle + (h.domain_upper() - h.domain_lower()) * Vec3d(1.1, -1.7, 0.8);
-    scene.view.at = middle;
-    scene.transfer_function.extinction = {{0.5, 0}, {1, 20}};
-    scene.transfer_function.color = {{0, {1, 0.2, 0}}, {1, {0, 0.5, 1}}};
-    scene.settings.width = 60;
-    scene.settings.height = 48;
+    const Scene scene = oblique_scene(h, 60, 48);
     const auto draw = [&](const char* traversal, Filtering filtering) {
       const EncodedField field = kd_field(h, Filter::linear_lod, {{"traversal", traversal}}, {.filtering = filtering});
       const GpuField gpu(field, gl);
@@ -424,6 +564,61 @@ TEST(KdTree, RefusesWhatItsBitsCannotTell) {
   EXPECT_THAT(refusal(wide, {}), AllOf(HasSubstr("unsupported: encoding kd_tree"), HasSubstr("8000 cells"), HasSubstr("4095")));
 }
 
+std::string partition_refusal(const AmrHierarchy& h, const kd::PartitionOptions& options) {
+  try {
+    kd::Tree tree = kd::build_tree(h, options);
+    if (options.covers) kd::add_detail_blocks(h, tree, options.limits);
+    return "built";
+  } catch (const UnsupportedError& e) {
+    return e.what();
+  }
+}
+
+TEST(KdTree, RefusesMoreThanANodeCanTell) {
+  // the numbers of the layout are too large for a test: the same code with smaller ones
+  EXPECT_EQ(kd::kMostNodes, 1 << 24);
+  EXPECT_EQ(kd::kMostLeaves, (1 << 20) - 1);
+  EXPECT_EQ(kd::kMostLevels, 64);
+  EXPECT_EQ(kd::kMostSplit, 4095);
+  const AmrHierarchy h = refined_corner();  // 7 nodes, 4 leaves, 2 levels, planes 4 cells from a corner
+  kd::PartitionOptions o;
+  o.limits = {.levels = 2, .nodes = 7, .blocks = 4, .split = 4};
+  EXPECT_EQ(partition_refusal(h, o), "built");
+  o.limits.nodes = 6;
+  EXPECT_THAT(partition_refusal(h, o), AllOf(HasSubstr("encoding kd_tree"), HasSubstr("more than 6 nodes")));
+  o.limits = {.levels = 2, .nodes = 7, .blocks = 3, .split = 4};
+  EXPECT_THAT(partition_refusal(h, o), AllOf(HasSubstr("encoding kd_tree"), HasSubstr("more than 3 blocks")));
+  o.limits = {.levels = 1, .nodes = 7, .blocks = 4, .split = 4};
+  EXPECT_THAT(partition_refusal(h, o), AllOf(HasSubstr("2 levels"), HasSubstr("at most 1")));
+  o.limits = {.levels = 2, .nodes = 7, .blocks = 4, .split = 3};
+  EXPECT_THAT(partition_refusal(h, o), AllOf(HasSubstr("4 cells of level 0"), HasSubstr("at most 3")));
+  // with a level of detail the corner's refined root cells are a fifth block
+  o.limits = {.levels = 2, .nodes = 7, .blocks = 4, .split = 4};
+  o.covers = true;
+  EXPECT_THAT(partition_refusal(h, o), HasSubstr("more than 4 blocks"));
+}
+
+TEST(KdTree, RefusesMoreThanASubtreeOfManyMayAdd) {
+  const AmrHierarchy h = checkerboard(20);  // 4000 subgrids: subtrees are built side by side
+  const auto blocks = static_cast<std::int64_t>(kd::build_tree(h).leaves.size());
+  kd::PartitionOptions o;
+  o.limits.blocks = blocks;
+  EXPECT_EQ(partition_refusal(h, o), "built");
+  o.limits.blocks = blocks - 1;
+  EXPECT_THAT(partition_refusal(h, o), HasSubstr(fmt::format("more than {} blocks", blocks - 1)));
+}
+
+TEST(KdTree, MoreLevelsThanANodeTellsAreNoMesh) {
+  // the mesh is refused before any encoding
+  MeshDescription mesh = MeshBuilder(Vec3i(1), std::vector<int>(69, 2)).root(waves).description();
+  try {
+    const AmrHierarchy h(mesh);
+    FAIL() << "accepted " << h.level_count() << " levels";
+  } catch (const Error& e) {
+    EXPECT_THAT(e.what(), HasSubstr("70 levels; at most 64"));
+  }
+}
+
 TEST(KdTree, NamesTheLimitThatItWouldPass) {
   const AmrHierarchy h = refined_corner();
   BuildRequest request;
@@ -445,9 +640,232 @@ TEST(KdTree, RefusesBadParametersWithWhatIsAccepted) {
       request.parameters = {{name, bad}};
       EXPECT_THAT(refusal(h, request), AllOf(HasSubstr("usage: encoding kd_tree"), HasSubstr(name), HasSubstr("accepted: \"")));
     }
+  BuildRequest wrap;
+  wrap.parameters = {{"wrap", 1}};
+  EXPECT_THAT(refusal(h, wrap), AllOf(HasSubstr("usage: encoding kd_tree"), HasSubstr("wrap"), HasSubstr("true or false")));
+}
+
+// ---- bindless: a texture a brick
+
+const Json kBindless{{"storage_kind", "bindless"}};
+
+/// As for a context without limits.
+EncodedField bindless_field(const AmrHierarchy& h, Filter filter, Storage storage = Storage::r32f,
+                            Filtering filtering = Filtering::manual, std::vector<int> more_fields = {}) {
   BuildRequest request;
-  request.parameters = {{"storage_kind", "bindless"}};
-  EXPECT_THAT(refusal(h, request), AllOf(HasSubstr("unsupported:"), HasSubstr("not available in this version")));
+  request.parameters = kBindless;
+  request.needs.filter = filter;
+  request.needs.filtering = filtering;
+  request.storage = storage;
+  request.more_fields = std::move(more_fields);
+  return find_encoding("kd_tree").build(h, request);
+}
+
+/// 500 subgrids of 4^3 cells, none beside another, over one of 20^3.
+AmrHierarchy many_subgrids() {
+  MeshBuilder mesh(Vec3i(20), {2});
+  mesh.root(waves);
+  for_each_cell({Vec3i(0), Vec3i(10)}, [&](const Vec3i& b) {
+    if ((b.x + b.y + b.z) % 2 == 0) mesh.patch(1, {b * 4, (b + 1) * 4}, waves);
+  });
+  return mesh.hierarchy();
+}
+
+TEST(KdTreeBindless, EveryBrickIsATextureWithItsBorder) {
+  const AmrHierarchy h = refined_corner();
+  const auto check = [&](Filter filter, int root, int corner) {
+    const EncodedField field = bindless_field(h, filter);
+    std::vector<const HostTexture*> bricks;
+    for (const HostTexture& t : field.textures)
+      if (!t.handles.empty()) bricks.push_back(&t);
+    ASSERT_EQ(bricks.size(), 2u);
+    // the root brick: 16^3 cells, of which the refined 4^3 are in no leaf
+    const HostTexture& first = bricks[0]->size.x == root ? *bricks[0] : *bricks[1];
+    const HostTexture& second = &first == bricks[0] ? *bricks[1] : *bricks[0];
+    EXPECT_EQ(first.size, Vec3i(root));
+    EXPECT_EQ(first.roles, (MemoryByRole{4 * (4096 - 64), 4 * (root * root * root - 4096), 0, 4 * 64}));
+    EXPECT_EQ(second.size, Vec3i(corner));
+    EXPECT_EQ(second.roles, (MemoryByRole{4 * 512, 4 * (corner * corner * corner - 512), 0, 0}));
+    EXPECT_EQ(field.find("kd_handles")->roles, (MemoryByRole{0, 0, 2 * 8, 0}));
+    EXPECT_EQ(field.find("tex_kd_pool"), nullptr);
+    EXPECT_EQ(field.value_texels(), first.texels() + second.texels());
+    EXPECT_EQ(field.statistics["fill"], 1.0);
+    EXPECT_EQ(field.statistics["handle_loop"], true);
+  };
+  check(Filter::nearest, 16, 8);
+  check(Filter::linear_lod, 18, 10);
+  check(Filter::linear_vertex, 17, 9);
+}
+
+TEST(KdTreeBindless, DataNodesHoldTheirBrickAndTheirPlaceInIt) {
+  const AmrHierarchy h = refined_corner();
+  const kd::Tree tree = kd::build_tree(h);
+  const EncodedField field = bindless_field(h, Filter::nearest);
+  const auto* words = field.find("kd_data")->as<std::uint32_t>();
+  ASSERT_EQ(field.find("kd_data")->texels(), static_cast<std::int64_t>(3 * tree.leaves.size())) << "place, brick, value range";
+  std::vector<const HostTexture*> bricks(2);
+  for (const HostTexture& t : field.textures)
+    if (!t.handles.empty()) bricks[static_cast<std::size_t>(t.handle_index)] = &t;
+  for (const kd::Leaf& leaf : tree.leaves) {
+    EXPECT_EQ(bricks.at(words[1])->size, Vec3i(leaf.level == 0 ? 16 : 8));
+    const Vec3i at = leaf.cells.lower;  // both bricks start at cell 0; 16 texels an axis take 4 bits
+    EXPECT_EQ(words[0], static_cast<std::uint32_t>(at.x | (at.y << 4) | (at.z << 8)));
+    words += 3;
+  }
+}
+
+TEST(KdTreeBindless, AFurtherFieldCostsItsTexturesAndTheirHandles) {
+  const AmrHierarchy h =
+      MeshBuilder(Vec3i(16), {2}).root(waves).patch(1, {Vec3i(0), Vec3i(8)}, waves).also("g", slopes).hierarchy();
+  const MemoryByRole one = bindless_field(h, Filter::linear_lod).memory();
+  const MemoryByRole two = bindless_field(h, Filter::linear_lod, Storage::r32f, Filtering::manual, {1}).memory();
+  EXPECT_EQ(two, (MemoryByRole{2 * one.payload, 2 * one.duplicated, one.topology + 2 * 8, 2 * one.padding}));
+}
+
+TEST(KdTreeBindless, TheCpuReadsThePoolsBits) {
+  for (std::uint64_t seed = 0; seed < 24; ++seed) {
+    const AmrHierarchy h(random_mesh(seed));
+    const auto positions = probe_positions(h, 20, seed);
+    for (const Filter filter : {Filter::nearest, Filter::linear_lod, Filter::linear_vertex})
+      for (const Storage storage : {Storage::r64f, Storage::r32f, Storage::r8, Storage::r16, Storage::r16f}) {
+        SCOPED_TRACE(fmt::format("seed {} {} {}", seed, filter_name(filter), format_name(storage)));
+        const auto expected =
+            probe_on_cpu(h, kd_field(h, filter, Json::object(), {.storage = storage}), Precision::double_precision, positions);
+        const auto got = probe_on_cpu(h, bindless_field(h, filter, storage), Precision::double_precision, positions);
+        const Comparison same = compare(positions, values_of(expected), got, 0.0);
+        EXPECT_TRUE(same) << same;
+      }
+  }
+}
+
+TEST(KdTreeBindless, HandlesAreCountedBeforeAnythingIsAllocated) {
+  const AmrHierarchy h = many_subgrids();
+  BuildRequest request;
+  request.parameters = kBindless;
+  request.context.max_resident_handles = 500;
+  request.memory_limit = 1;  // would be refused next
+  EXPECT_THAT(refusal(h, request), AllOf(HasSubstr("unsupported: encoding kd_tree"), HasSubstr("bindless"),
+                                         HasSubstr("501 textures x 1 field need 501 handles, the context takes 500")));
+  request.context.max_resident_handles = 501;
+  EXPECT_THAT(refusal(h, request), HasSubstr("budget:"));
+  request.more_fields = {0};
+  EXPECT_THAT(refusal(h, request), HasSubstr("501 textures x 2 fields need 1002 handles, the context takes 501"));
+}
+
+TEST(KdTreeBindless, NamesTheExtensionThatTheContextLacks) {
+  const AmrHierarchy h = refined_corner();
+  BuildRequest request;
+  request.parameters = kBindless;
+  request.context.renderer = "this renderer";
+  const Encoding& encoding = find_encoding("kd_tree");
+  EXPECT_TRUE(encoding.unsupported_values(request.context).empty());
+  request.context.shader_ballot = false;
+  EXPECT_THAT(refusal(h, request), HasSubstr("needs GL_ARB_shader_ballot, which this renderer lacks"));
+  request.context.handles_may_differ = true;
+  EXPECT_EQ(refusal(h, request), "built");
+  request.context.bindless_texture = false;
+  EXPECT_THAT(refusal(h, request), AllOf(HasSubstr("unsupported: encoding kd_tree: storage_kind \"bindless\""),
+                                         HasSubstr("needs GL_ARB_bindless_texture, which this renderer lacks")));
+  ASSERT_EQ(encoding.unsupported_values(request.context).size(), 1u);
+  EXPECT_EQ(encoding.unsupported_values(request.context)[0].value, "bindless");
+  EXPECT_THAT(encoding.unsupported_values(request.context)[0].reason, HasSubstr("GL_ARB_bindless_texture"));
+  EXPECT_TRUE(encoding.supported(request.context).ok) << "the pool needs nothing";
+}
+
+TEST(KdTreeBindless, NoLoopWhereHandlesMayDiffer) {
+  BuildRequest request;
+  request.parameters = kBindless;
+  request.context.handles_may_differ = true;
+  const EncodedField field = find_encoding("kd_tree").build(refined_corner(), request);
+  EXPECT_EQ(field.shader.extensions, std::vector<std::string>{"GL_ARB_bindless_texture"});
+  EXPECT_EQ(field.statistics["handle_loop"], false);
+}
+
+TEST(KdTreeBindless, AContextWithoutItRefusesTheUpload) {
+  Context& gl = context(ContextKind::osmesa);
+  if (gl.info().bindless_texture) GTEST_SKIP() << "OSMesa takes handles here";
+  const EncodedField field = bindless_field(refined_corner(), Filter::nearest);
+  try {
+    const GpuField gpu(field, gl);
+    ADD_FAILURE() << "uploaded";
+  } catch (const UnsupportedError& e) {
+    EXPECT_THAT(e.what(), AllOf(HasSubstr("encoding kd_tree"), HasSubstr("GL_ARB_bindless_texture")));
+  }
+}
+
+/// These run on zink too (tests/with_bindless.cpp), where they may not be skipped.
+class KdTreeBindlessOnGl : public testing::Test {
+ protected:
+  void SetUp() override {
+    const Support support = supports_handles(gl_.info());
+    if (!support.ok) GTEST_SKIP() << support.reason;
+  }
+  Context& gl_ = context(ContextKind::egl);
+};
+
+TEST_F(KdTreeBindlessOnGl, BytesAreWhatGlReports) {
+  const AmrHierarchy h = not_nested();
+  for (const Storage storage : {Storage::r8, Storage::r16, Storage::r16f, Storage::r32f})
+    for (const Filtering filtering : {Filtering::manual, Filtering::hardware}) {
+      const EncodedField field = bindless_field(h, Filter::linear_lod, storage, filtering, {0, 0, 0});
+      const GpuField gpu(field, gl_);
+      EXPECT_EQ(gpu.bytes(), field.memory().total());
+      EXPECT_EQ(gpu.bytes_reported(), field.memory().total()) << format_name(storage);
+    }
+}
+
+TEST_F(KdTreeBindlessOnGl, PicturesHaveThePoolsBits) {
+  for (const AmrHierarchy& h : {many_subgrids(), holes_and_missing(waves, 3).hierarchy()}) {
+    const Scene scene = oblique_scene(h, 80, 60);
+    for (const Filter filter : {Filter::nearest, Filter::linear_lod, Filter::linear_vertex})
+      for (const Filtering filtering : {Filtering::manual, Filtering::hardware}) {
+        const auto draw = [&](const Json& parameters) {
+          const EncodedField field = kd_field(h, filter, parameters, {.filtering = filtering});
+          const GpuField gpu(field, gl_);
+          Raycaster raycaster(gl_, h, field, gpu, scene);
+          raycaster.draw();
+          return raycaster.read().values;
+        };
+        SCOPED_TRACE(fmt::format("{} {}", filter_name(filter), filtering_name(filtering)));
+        const auto pool = draw(Json::object());
+        const auto bindless = draw(kBindless);
+        ASSERT_EQ(pool.size(), bindless.size());
+        EXPECT_GT(*std::max_element(pool.begin(), pool.end()), 0);
+        if (filter == Filter::nearest || filtering == Filtering::manual) {
+          EXPECT_EQ(bindless, pool);
+          continue;
+        }
+        // the texture coordinate is normalised by another size: 2^-12 of a value's range a sample, times the slope of light
+        double worst = 0;
+        for (std::size_t i = 0; i < pool.size(); ++i) worst = std::max(worst, std::abs(pool[i] - bindless[i]));
+        EXPECT_LT(worst, 0.01);
+      }
+  }
+}
+
+TEST_F(KdTreeBindlessOnGl, HandlesAreGivenBackAndNeverPassTheLimit) {
+  if (gl_.info().max_resident_handles != 1023) GTEST_SKIP() << "the limit of this driver is not known";
+  const AmrHierarchy h = many_subgrids();
+  const auto positions = probe_positions(h, 30);
+  const EncodedField field = bindless_field(h, Filter::nearest);
+  const auto expected = values_of(probe_on_cpu(h, field, Precision::single_precision, positions));
+  // 6 x 501 handles, one after the other
+  for (int i = 0; i < 6; ++i) {
+    const GpuField gpu(field, gl_);
+    EXPECT_TRUE(compare(positions, expected, probe_on_gl(gl_, h, field, gpu, positions), 0.0));
+  }
+  const GpuField first(field, gl_);
+  auto second = std::make_unique<GpuField>(field, gl_);
+  EXPECT_TRUE(compare(positions, expected, probe_on_gl(gl_, h, field, first, positions), 0.0));
+  try {
+    const GpuField third(field, gl_);
+    ADD_FAILURE() << "1503 handles were taken";
+  } catch (const UnsupportedError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("501 handles of textures beside 1002 in use, the context takes 1023"));
+  }
+  second.reset();
+  const GpuField third(field, gl_);
+  EXPECT_TRUE(compare(positions, expected, probe_on_gl(gl_, h, field, third, positions), 0.0));
 }
 
 }  // namespace

@@ -82,10 +82,10 @@ inline int choose_width(const AmrHierarchy& h, const Tree& tree, const std::vect
   return chosen;
 }
 
-/// The deepest node that holds all of a box of finest cells.
+/// The deepest node that holds all of a box of finest cells; with a level of detail, none below one that may be drawn itself.
 inline std::uint32_t deepest_holding(const Tree& tree, const std::vector<Box>& boxes, const Box& box) {
   std::uint32_t i = 0;
-  while (tree.nodes[i].first_child != 0) {
+  while (tree.nodes[i].first_child != 0 && tree.nodes[i].leaf < 0) {
     const std::uint32_t child = tree.nodes[i].first_child;
     if (boxes[child].contains(box))
       i = child;

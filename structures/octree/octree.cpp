@@ -171,7 +171,7 @@ class TreeWriter {
         mesh_(h, request.field, tree.ghosts),
         fills_(h, request.field),
         ghosts_(tree.ghosts),
-        linear_(request.needs.filter != Filter::nearest) {}
+        averages_(plan.lod_texture || plan.averages_in_slots) {}
 
   /// Writes the node and, through `below(child, index, next)`, those under it; `next` is the first free index.
   template <class Below>
@@ -199,6 +199,7 @@ class TreeWriter {
         const std::int64_t at = options_.paper_layout ? next++ : grandchild++;
         part = below(child[k], at, next);
         put_inner(8 * index + i, at, average(child[k], value[k], part, i));
+        if (request_.needs.level_of_detail && part.volume > 0) put_valid(8 * index + i);
       } else {
         if (kind[k] == CellKind::leaf) {
           const double volume = std::ldexp(1.0, 3 * child[k].shift);
@@ -237,7 +238,7 @@ class TreeWriter {
   /// Level value of an inner child: the same rule and the same bits as everywhere (level_values.hpp); between
   /// and above levels the mean of what lies below.
   double average(const TreeCell& c, double stored, const Mean& below, int octant) {
-    if (!linear_) return 0;
+    if (!averages_) return 0;
     const int level = mesh_.level_at(c.shift);
     if (level < 0) return std::isnan(below.value()) ? 0 : below.value();
     double v = stored;
@@ -284,9 +285,13 @@ class TreeWriter {
       return;
     }
     put_value(slot, value);
+    if (kind == CellKind::leaf) put_valid(slot);
+  }
+
+  /// A leaf with a value; with a level of detail also an inner cell that has one.
+  void put_valid(std::int64_t slot) {
     // the eight bits of a node are one byte: threads do not share it
-    if (plan_.validity && kind == CellKind::leaf)
-      stores_.validity.data[static_cast<std::size_t>(slot >> 3)] |= static_cast<std::byte>(1U << (slot & 7));
+    if (plan_.validity) stores_.validity.data[static_cast<std::size_t>(slot >> 3)] |= static_cast<std::byte>(1U << (slot & 7));
   }
 
   /// A word of the layout `rgba8`.
@@ -303,7 +308,7 @@ class TreeWriter {
   TreeMesh mesh_;
   NodeFills fills_;
   bool ghosts_;
-  bool linear_;
+  bool averages_;
 };
 
 /// Writes the nodes above the subtrees; `subtree(k, index, next)` stands for the k-th of these.
@@ -504,11 +509,27 @@ std::vector<PatchPart> patch_parts(std::span<const Patch> patches) {
   return parts;
 }
 
+/// Boxes of cells of a level that finer patches lie on, whether a patch of the level stores them or not.
+std::vector<Box> refined_parts(const AmrHierarchy& h, int level) {
+  std::vector<Box> parts;
+  for (int finer = level + 1; finer < h.level_count(); ++finer)
+    for (const PatchPart& part : patch_parts(h.patches(finer)))
+      parts.push_back(part.box.coarsened(h.cell_width(level) / h.cell_width(finer)));
+  return parts;
+}
+
 void write_ranges(const AmrHierarchy& h, const BuildRequest& request, const Tree& tree, const TreeReader& reader,
                   const EncodedField& field, HostTexture& ranges) {
   std::vector<ValueRange> of_node(static_cast<std::size_t>(tree.nodes));
   tbb::spin_mutex mutex;  // a node may lie over the face between two parts
   tbb::enumerable_thread_specific<WindowRanges> windows;
+  const auto add = [&](std::int64_t node, const ValueRange& range) {
+    if (range.empty()) return;
+    const tbb::spin_mutex::scoped_lock lock(mutex);
+    ValueRange& all = of_node[static_cast<std::size_t>(node)];
+    all.add(range.min);
+    all.add(range.max);
+  };
   for (int level = 0; level < h.level_count(); ++level) {
     const int shift = std::countr_zero(static_cast<unsigned>(h.cell_width(level)));
     const std::vector<PatchPart> parts = patch_parts(h.patches(level));
@@ -523,11 +544,18 @@ void write_ranges(const AmrHierarchy& h, const BuildRequest& request, const Tree
         for_each_cell(cells, [&](const Vec3i& c) {
           if (mask[patch.offset(c)] != 0) window.add_to(range, c);
         });
-        if (range.empty()) return;
-        const tbb::spin_mutex::scoped_lock lock(mutex);
-        ValueRange& all = of_node[static_cast<std::size_t>(node)];
-        all.add(range.min);
-        all.add(range.max);
+        add(node, range);
+      });
+    });
+    if (!request.needs.level_of_detail) continue;
+    const std::vector<Box> refined = refined_parts(h, level);
+    tbb::parallel_for(std::size_t{0}, refined.size(), [&](std::size_t k) {
+      WindowRanges& window = windows.local();
+      window.read(h, request.field, level, refined[k]);
+      for_each_node_of(tree, reader, shift, refined[k], [&](std::int64_t node, const Box& cells) {
+        ValueRange range;
+        for_each_cell(cells, [&](const Vec3i& c) { window.add_to(range, c); });
+        add(node, range);
       });
     });
   }
@@ -601,6 +629,7 @@ class Octree final : public Encoding {
   }
   void check_parameters(const Json& parameters) const override { options(parameters); }
   Support supported(const ContextInfo&) const override { return {}; }
+  Support level_of_detail() const override { return {}; }
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
@@ -645,6 +674,10 @@ void Octree::require_support(const AmrHierarchy& h, const BuildRequest& request,
     throw UnsupportedError(
         fmt::format("encoding octree: layout rgba8 holds a sample in 8 bits, not in {}; accepted: storage r8, or layout wide",
                     format_name(request.storage)));
+  if (o.paper_layout && request.needs.level_of_detail)
+    throw UnsupportedError(
+        "encoding octree: no level of detail with layout rgba8: the word of an inner node has no room for a gradient, nor to say "
+        "whether it has a value; accepted: layout wide");
   if (request.field_count() > 1) require_shared_tree(h, request, o);
   if (o.paper_traversal && o.start_grid > 0)
     throw UnsupportedError(
@@ -677,13 +710,14 @@ void plan_start_grid(const AmrHierarchy& h, const BuildRequest& request, const O
 void Octree::plan_stores(const BuildRequest& request, const Options& o, const Tree& tree, Plan& p) const {
   const std::int64_t most_bytes = request.context.max_buffer_bytes;
   const bool linear = request.needs.filter != Filter::nearest;
+  const bool averages = linear || request.needs.level_of_detail;
   p.node_words = o.paper_layout ? 8 * tree.nodes : tree.nodes;
   p.node_buffer = !o.paper_traversal && 4 * p.node_words <= most_bytes;
   // several fields have their values in textures, of which a shader takes an array
   p.value_buffer =
       !o.paper_traversal && request.storage == Storage::r32f && 32 * tree.nodes <= most_bytes && request.field_count() == 1;
-  p.lod_texture = linear && (o.paper_layout || o.paper_traversal);
-  p.averages_in_slots = linear && !p.lod_texture;
+  p.lod_texture = averages && (o.paper_layout || o.paper_traversal);
+  p.averages_in_slots = averages && !p.lod_texture;
   p.ranges = linear && request.needs.value_ranges;
   const int most_texels = request.context.max_3d_texture_size / 2;
   const int limit = o.paper_layout ? std::min(most_texels, 1 << kPaperAddressBits) : most_texels;
@@ -701,7 +735,7 @@ Plan Octree::plan(const AmrHierarchy& h, const BuildRequest& request, const Opti
         fmt::format("encoding octree: {} nodes or more, an address of {} bits tells at most {} apart ({} leaf cells fit)",
                     tree.nodes, AMRTEX_OCTREE_INDEX_BITS, kMostNodes, 7 * kMostNodes + 1));
   Plan p;
-  p.validity = h.has_missing(request.field) && !o.paper_layout;
+  p.validity = any_missing(h, request) && !o.paper_layout;
   plan_stores(request, o, tree, p);
   const Vec3l texture(p.texture.nodes());
   const std::int64_t in_texture = texture.x * texture.y * texture.z;
@@ -793,10 +827,10 @@ std::vector<LeftOut> left_out(const BuildRequest& request, const Options& o, con
   if (o.paper_layout && !request.needs.gradients)
     list.push_back({"gradients", "no surface is lit; their two channels stay empty", 0});
   if (!p.lod_texture)
-    list.push_back(
-        {"LOD texture",
-         linear ? "the averages stand in the texels that inner children leave unused" : "the filter nearest reads no averages",
-         tree.nodes * texel_bytes(request.storage)});
+    list.push_back({"LOD texture",
+                    p.averages_in_slots ? "the averages stand in the texels that inner children leave unused"
+                                        : "the filter nearest reads no averages",
+                    tree.nodes * texel_bytes(request.storage)});
   if (!missing) list.push_back({"validity bits", "every cell has a value", tree.nodes});
   if (linear && !p.ranges) list.push_back({"value ranges", "no region is skipped", 4 * tree.nodes});
   return list;
@@ -827,7 +861,7 @@ EncodedField Octree::build(const AmrHierarchy& h, const BuildRequest& request) c
     t.roles = (t.holds_values ? stores.values : stores.lod).roles;
   }
   field.statistics = statistics(tree, p, counts);
-  field.left_out = left_out(request, o, tree, p, h.has_missing(request.field));
+  field.left_out = left_out(request, o, tree, p, any_missing(h, request));
   add_shader_inputs(o, p, tree, field);
   field.shader.defines.emplace_back("AMRTEX_OCTREE_GRADIENTS", gradients ? 1 : 0);
   for (HostTexture* t :

@@ -68,11 +68,11 @@ VALUE_TEXTURES(tex_octree_lod, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)  // one texel 
 BUFFER(uint, octree_start, octree_start_block)
 UNIFORM(ivec3, u_octree_start)  // cells of the start grid
 #endif
-#if AMRTEX_CPP || (AMRTEX_OCTREE_START && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST && !AMRTEX_OCTREE_LOD)
+#if AMRTEX_CPP || (AMRTEX_OCTREE_START && (AMRTEX_FILTER != AMRTEX_FILTER_NEAREST || AMRTEX_LEVEL_OF_DETAIL) && !AMRTEX_OCTREE_LOD)
 BUFFER(uint, octree_start_slots, octree_start_slots_block)  // where the average of each cell of the start grid stands
 #endif
 #if AMRTEX_CPP || (AMRTEX_VALIDITY && AMRTEX_OCTREE_LAYOUT == AMRTEX_OCTREE_WIDE)
-BUFFER(uint, octree_validity, octree_validity_block)  // one bit a slot: a leaf with a value
+BUFFER(uint, octree_validity, octree_validity_block)  // one bit a slot: a leaf (or what may be drawn in its place) with a value
 #endif
 #if AMRTEX_CPP || (AMRTEX_VALUE_RANGES && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST)
 BUFFER(uint, octree_ranges, octree_ranges_block)  // one code a node: of all that its leaves can return
@@ -212,22 +212,89 @@ void octree_empty_region(IN(uvec3) c, IN(int) shift, INOUT(Region) r) {
   r.width = min(r.width, 1 << min(shift, 30));
 }
 
+// Sample of a leaf, or average of an inner node, in `slot`; `node` is the inner node.
+real octree_depth_value(IN(int) slot, IN(int) node, IN(bool) inner, IN(int) field) {
+#if AMRTEX_CPP || AMRTEX_OCTREE_LOD
+  if (AMRTEX_OCTREE_LOD != 0) {
+    if (inner) return texelFetch(tex_octree_lod[field], octree_node_texel(node), 0).x;
+  }
+#endif
+  return octree_stored(slot, field);
+}
+
+// Slot in the parent of an inner cell of the start grid, where its average stands.
+int octree_average_slot(IN(uvec3) c, IN(int) shift) {
+#if AMRTEX_CPP || (AMRTEX_OCTREE_START && (AMRTEX_FILTER != AMRTEX_FILTER_NEAREST || AMRTEX_LEVEL_OF_DETAIL) && !AMRTEX_OCTREE_LOD)
+  return int(octree_start_slots[octree_start_index(c, shift)]);
+#else
+  return 0;
+#endif
+}
+
+// The value of a region's cell: a leaf, or with a level of detail an inner cell.
 real octree_leaf_value(IN(Region) r, IN(int) field) {
   // the octant follows from where the region lies
   int slot = r.handle.x * 8 + octree_octant(octree_from_finest(r.lower), findLSB(r.width));
-  return decode_value(octree_stored(slot, field), field);
+  return decode_value(octree_depth_value(slot, r.handle.z, r.handle.w != 0, field), field);
 }
+
+#if AMRTEX_CPP || AMRTEX_LEVEL_OF_DETAIL
+// Is the inner cell of width 2^shift that holds a finest cell one of a level, and does it suffice?
+bool octree_suffices(IN(ivec3) cell, IN(int) shift) {
+  int level = octree_level(shift);
+  int width = level_width(level);
+  if (width != 1 << shift) return false;
+  ivec3 lower = cell & ivec3(-width);
+  return level_suffices(lower, lower + ivec3(width), level, level + 1);
+}
+
+// octree_find, but for the cell that is drawn: the leaf, or the first inner cell above it that suffices. `node`: the inner one's, else -1.
+int octree_find_drawn(IN(ivec3) cell, OUT(int) shift, OUT(int) node) {
+  uvec3 c = octree_from_finest(cell);
+  shift = octree_start_shift();
+  uint entry = octree_begin(c, shift);
+  int slot = int(entry & AMRTEX_OCTREE_SLOT_MASK);
+  int above = int(entry >> uint(AMRTEX_OCTREE_SLOT_BITS));
+  node = -1;
+  if (above != AMRTEX_OCTREE_START_INNER) {
+    shift += above;
+    return slot;
+  }
+  int inner_node = slot;
+  bool drawn = false;
+  if (AMRTEX_OCTREE_START_SHIFT == 0) drawn = octree_suffices(cell, shift);
+  if (drawn && AMRTEX_OCTREE_LOD == 0) slot = octree_average_slot(c, shift);
+  bool inner = true;
+  if (!drawn) {
+    do {
+      shift -= 1;
+      slot = inner_node * 8 + octree_octant(c, shift);
+      uint word = octree_word(slot);
+      inner = octree_is_inner(word, slot);
+      inner_node = octree_child_node(word, slot);
+      if (inner) drawn = octree_suffices(cell, shift);
+    } while (inner && !drawn && shift > 0);
+  }
+  if (drawn) node = inner_node;
+  return slot;
+}
+#endif
 
 bool locate(IN(Position) p, OUT(Region) r) {
   int shift = 0;
   uvec3 c = octree_from_finest(p.cell);
-  int slot = octree_find(c, shift);
+  int node = -1;
+  int slot = 0;
+#if AMRTEX_CPP || AMRTEX_LEVEL_OF_DETAIL
+  if (AMRTEX_LEVEL_OF_DETAIL != 0) slot = octree_find_drawn(p.cell, shift, node);
+#endif
+  if (AMRTEX_LEVEL_OF_DETAIL == 0) slot = octree_find(c, shift);
   r.level = octree_level(shift);
   r.width = level_width(r.level);
   r.lower = p.cell & ivec3(-r.width);
   r.upper = r.lower + ivec3(r.width);
   r.value_range = vec2r(0);
-  r.handle = ivec4(slot >> 3, shift, 0, 0);
+  r.handle = ivec4(slot >> 3, shift, node, node >= 0 ? 1 : 0);
   bool inside = true;
   if (AMRTEX_VALIDITY != 0) {
     inside = octree_has_value(slot);
@@ -251,16 +318,6 @@ uvec3 octree_corner(IN(uvec3) low, IN(uvec3) high, IN(int) i) {
   return uvec3((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y, (i & 4) != 0 ? high.z : low.z);
 }
 
-// Sample of a leaf, or average of an inner node, in `slot`; `node` is the inner node.
-real octree_depth_value(IN(int) slot, IN(int) node, IN(bool) inner, IN(int) field) {
-#if AMRTEX_CPP || AMRTEX_OCTREE_LOD
-  if (AMRTEX_OCTREE_LOD != 0) {
-    if (inner) return texelFetch(tex_octree_lod[field], octree_node_texel(node), 0).x;
-  }
-#endif
-  return octree_stored(slot, field);
-}
-
 // The paper's way: a full descent from the root to the depth whose cells are 2^shift wide.
 real octree_descend(IN(uvec3) c, IN(int) shift, IN(int) field) {
   int at = octree_start_shift();
@@ -275,15 +332,6 @@ real octree_descend(IN(uvec3) c, IN(int) shift, IN(int) field) {
     node = octree_child_node(word, slot);
   } while (inner && at > shift);
   return octree_depth_value(slot, node, inner, field);
-}
-
-// Slot in the parent of an inner cell of the start grid, where its average stands.
-int octree_average_slot(IN(uvec3) c, IN(int) shift) {
-#if AMRTEX_CPP || (AMRTEX_OCTREE_START && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST && !AMRTEX_OCTREE_LOD)
-  return int(octree_start_slots[octree_start_index(c, shift)]);
-#else
-  return 0;
-#endif
 }
 
 void octree_stencil(IN(Region) r, IN(int) field, IN(ivec3) octant, OUT(Stencil) s) {
@@ -343,6 +391,8 @@ void octree_stencil(IN(Region) r, IN(int) field, IN(ivec3) octant, OUT(Stencil) 
       bool outside = ((i & 1) != 0 ? behind.x : before.x) || ((i & 2) != 0 ? behind.y : before.y) || ((i & 4) != 0 ? behind.z : before.z);
       s.leaves |= same[i] && !outside ? 1u << uint(i) : 0u;
     }
+    // which neighbours are drawn at this level only their own locate() knows
+    if (AMRTEX_LEVEL_OF_DETAIL != 0) s.leaves = 1u << uint((1 - octant.x) + 2 * (1 - octant.y) + 4 * (1 - octant.z));
   }
   s.lower = vec4r(v[0], v[1], v[2], v[3]);
   s.upper = vec4r(v[4], v[5], v[6], v[7]);

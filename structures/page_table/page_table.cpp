@@ -44,6 +44,7 @@ struct Page {
   int kind = AMRTEX_PAGE_ABSENT;
   std::uint32_t index = 0;  ///< in the pool
   std::uint32_t green = 0;  ///< second channel of its entries
+  bool pruned = false;      ///< absent because nothing of it can be seen
 };
 
 std::uint32_t red_of(int kind, int level, std::uint32_t index) {
@@ -96,6 +97,47 @@ std::vector<Page> partition(const AmrHierarchy& h, int page_size) {
   for_each_cell({Vec3i(0), ceil_div(h.cells(0), page_size)}, [&](const Vec3i& index) { descend(descend, 0, index); });
   return pages;
 }
+
+/// The pages' boxes under planes that cut none of them: whole ranges of pages are halved, then a divided page into its own.
+class PageDrawTree {
+ public:
+  PageDrawTree(const AmrHierarchy& h, int page_size, const std::vector<Page>& pages) : hierarchy_(h), page_size_(page_size) {
+    for (const Page& p : pages) pages_[key(p.level, p.index_in_level)] = p.kind;
+    tree_.nodes.emplace_back();
+    grow(0, 0, {Vec3i(0), ceil_div(h.cells(0), page_size)});
+  }
+  DrawTree tree() && { return std::move(tree_); }
+
+ private:
+  static std::array<int, 4> key(int level, const Vec3i& index) { return {level, index.x, index.y, index.z}; }
+
+  void grow(std::size_t node, int level, const Box& range) {
+    const Vec3i n = range.size();
+    const int axis = n.x >= n.y && n.x >= n.z ? 0 : n.y >= n.z ? 1 : 2;
+    if (n[axis] == 1) return add(node, level, range.lower);
+    std::array<Box, 2> halves{range, range};
+    const int middle = range.lower[axis] + n[axis] / 2;
+    halves[0].upper[axis] = halves[1].lower[axis] = middle;
+    const std::size_t child = tree_.split(node, axis, middle * page_size_ * hierarchy_.cell_width(level));
+    for (const std::size_t side : {0, 1}) grow(child + side, level, halves[side]);
+  }
+
+  void add(std::size_t node, int level, const Vec3i& index) {
+    const auto page = pages_.find(key(level, index));
+    if (page == pages_.end()) {  // divided
+      const Box inside{Vec3i(0), ceil_div(hierarchy_.cells(level + 1), page_size_)};
+      return grow(node, level + 1, intersection(Box{index, index + Vec3i(1)}.refined(hierarchy_.ratio_to_finer(level)), inside));
+    }
+    if (page->second == AMRTEX_PAGE_ABSENT) return;
+    const Box cells = intersection(Box{index, index + Vec3i(1)}.refined(page_size_), hierarchy_.domain(level));
+    tree_.set_box(node, cells.refined(hierarchy_.cell_width(level)), level);
+  }
+
+  const AmrHierarchy& hierarchy_;
+  int page_size_;
+  std::map<std::array<int, 4>, int> pages_;  ///< level and index: kind
+  DrawTree tree_;
+};
 
 /// The table: entries of the finest pages' size, in one level or two.
 struct TablePlan {
@@ -242,9 +284,41 @@ bool is_constant(const PageContents& c, const BuildRequest& request) {
   return request.more_fields.empty() && c.all && c.range.min == c.range.max && constant_is_exact(c.range.min, request.storage);
 }
 
+/// Node-centred pages lie side by side without a border: in a page's last vertex the rounding of the
+/// normalised coordinate (3 times 2^-24 of the pool an axis) lets the texture unit see a little of the next page.
+double leaked_value(const FieldStatistics& s, const Vec3i& pool) {
+  const double weight = 3 * std::ldexp(3.0, -24) * std::max({pool.x, pool.y, pool.z});
+  return weight * std::max({s.max - s.min, std::abs(s.min), std::abs(s.max)});
+}
+
+/// Which pages the scene cannot show.
+class HiddenPages {
+ public:
+  HiddenPages(const AmrHierarchy& h, const BuildRequest& request, const Options& o)
+      : request_(request), statistics_(h.statistics(request.field)), leak_(most_leaked(request, o)) {}
+  bool operator()(const PageContents& c) const {
+    const StorageScale scale = storage_scale(request_.storage, statistics_.min, statistics_.max);
+    ValueRange range = c.range;
+    if (!range.empty()) range = {range.min - leak_, range.max + leak_};
+    return hidden(request_.needs, range, range_origin(statistics_, request_.storage, scale), request_.storage, scale);
+  }
+
+ private:
+  /// Before the pool's size is known.
+  double most_leaked(const BuildRequest& request, const Options& o) const {
+    return o.nodes ? leaked_value(statistics_, Vec3i(request.context.max_3d_texture_size)) : 0;
+  }
+
+  const BuildRequest& request_;
+  const FieldStatistics& statistics_;
+  double leak_;
+};
+
 /// Sets the kind of a page, and what a constant one holds. Further fields are read only where those before have nothing.
-void classify(PageReader& reader, const BuildRequest& request, Page& page) {
+void classify(PageReader& reader, const BuildRequest& request, const HiddenPages& is_hidden, Page& page) {
   PageContents c = reader.read(page, request.field);
+  page.pruned = c.any && is_hidden(c);
+  if (page.pruned) return;  // absent, at its own level: rays step over the same box
   for (const int other : request.more_fields)
     if (!c.any) c = reader.read(page, other);
   page.kind = !c.any ? AMRTEX_PAGE_ABSENT : is_constant(c, request) ? AMRTEX_PAGE_CONSTANT : AMRTEX_PAGE_STORED;
@@ -271,11 +345,15 @@ class PageTable final : public Encoding {
   }
   void check_parameters(const Json& parameters) const override { values(parameters); }
   Support supported(const ContextInfo&) const override { return {}; }
+  Support level_of_detail() const override {
+    return {false, "a page is stored at the finest level that it holds, and at no other"};
+  }
+  bool prunes() const override { return true; }
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
   Options values(const Json& parameters) const;
-  Options options(const Json& parameters, Filter filter) const;
+  Options options(const Json& parameters, const SceneNeeds& needs) const;
   Sizes sizes(std::int64_t stored, const Options& o, const TablePlan& table, bool validity, const BuildRequest& request) const;
 };
 
@@ -293,14 +371,15 @@ Options PageTable::values(const Json& parameters) const {
   return o;
 }
 
-Options PageTable::options(const Json& parameters, Filter filter) const {
+Options PageTable::options(const Json& parameters, const SceneNeeds& needs) const {
+  const Filter filter = needs.filter;
   Options o = values(parameters);
   if (o.nodes != (filter == Filter::linear_vertex))
     throw UnsupportedError(
         fmt::format("encoding page_table: centring {} has no filter {}; centring cell has nearest, linear_page and centring node "
                     "has linear_vertex",
                     o.nodes ? "node" : "cell", filter_name(filter)));
-  o.border = filter == Filter::linear_page ? 1 : 0;
+  o.border = filter == Filter::linear_page || (needs.everything && !o.nodes) ? 1 : 0;
   o.edge = o.nodes ? o.page_size + 1 : o.page_size + 2 * o.border;
   return o;
 }
@@ -343,9 +422,10 @@ void write_page(const Options& o, const PoolLayout& pool, std::int64_t index, St
 
 /// Reads every page to learn what is absent or constant, then numbers the stored ones.
 std::int64_t number_pages(const AmrHierarchy& h, const BuildRequest& request, const Options& o, std::vector<Page>& pages) {
+  const HiddenPages is_hidden(h, request, o);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pages.size(), 8), [&](const auto& range) {
     PageReader reader(h, o);
-    for (std::size_t i = range.begin(); i != range.end(); ++i) classify(reader, request, pages[i]);
+    for (std::size_t i = range.begin(); i != range.end(); ++i) classify(reader, request, is_hidden, pages[i]);
   });
   std::int64_t stored = 0;
   for (Page& p : pages)
@@ -439,6 +519,7 @@ Json statistics(const AmrHierarchy& h, const Options& o, const std::vector<Page>
   json["pages"] = stored;
   json["constant_pages"] = constant;
   json["absent_pages"] = absent;
+  json["pruned_pages"] = std::count_if(pages.begin(), pages.end(), [](const Page& p) { return p.pruned; });
   json["pages_a_level"] = levels;
   json["page_texels"] = o.page_texels();
   json["border_overhead"] = static_cast<double>(stored * (o.page_texels() - o.page_cells())) / pages_cells;
@@ -448,13 +529,6 @@ Json statistics(const AmrHierarchy& h, const Options& o, const std::vector<Page>
   json["table_entries"] = table.top_bytes() / table.entry_bytes();
   json["subtables"] = table.subtables;
   return json;
-}
-
-/// Node-centred pages lie side by side without a border: in a page's last vertex the rounding of the
-/// normalised coordinate (3 times 2^-24 of the pool an axis) lets the texture unit see a little of the next page.
-double leaked_value(const FieldStatistics& s, const Vec3i& pool) {
-  const double weight = 3 * std::ldexp(3.0, -24) * std::max({pool.x, pool.y, pool.z});
-  return weight * std::max({s.max - s.min, std::abs(s.min), std::abs(s.max)});
 }
 
 /// What the pages are written to.
@@ -550,9 +624,13 @@ void add_shader_inputs(const AmrHierarchy& h, const Options& o, const TablePlan&
   uniforms.emplace_back("u_subtable_shift", table.sub_layout.shift);
 }
 
-std::vector<LeftOut> left_out(const Options& o, const TablePlan& table, std::int64_t stored, bool validity,
+std::vector<LeftOut> left_out(const Options& o, const TablePlan& table, std::int64_t stored, std::int64_t pruned, bool validity,
                               const EncodedField& field) {
   std::vector<LeftOut> list;
+  if (pruned > 0) {
+    const std::int64_t page_bytes = o.page_texels() * texel_bytes(field.storage) + (validity ? o.page_cells() / 8 : 0);
+    list.push_back({"pages", "the transfer function hides all that is in them", pruned * page_bytes * field.field_count});
+  }
   const std::int64_t pages = stored * field.field_count;
   if (!validity) list.push_back({"validity bits", "every cell has a value", pages * o.page_cells() / 8});
   if (!table.green)
@@ -568,9 +646,10 @@ std::vector<LeftOut> left_out(const Options& o, const TablePlan& table, std::int
 
 EncodedField PageTable::build(const AmrHierarchy& h, const BuildRequest& request) const {
   require_filter(*this, request.needs.filter);
+  require_level_of_detail(*this, request.needs);
   require_fields(*this, h, request);
   const Json parameters = complete_parameters(*this, request.parameters);
-  const Options o = options(parameters, request.needs.filter);
+  const Options o = options(parameters, request.needs);
   if (h.level_count() > kMostLevels)
     throw UnsupportedError(
         fmt::format("encoding page_table: {} levels, an entry of the table tells at most {}", h.level_count(), kMostLevels));
@@ -586,11 +665,14 @@ EncodedField PageTable::build(const AmrHierarchy& h, const BuildRequest& request
   Storages stores = store_pages(h, request, o, size, field, pages);
   field.statistics = statistics(h, o, pages, table, stored);
   add_shader_inputs(h, o, table, size, constants, field);
-  field.left_out = left_out(o, table, stored, validity, field);
+  const auto pruned = std::count_if(pages.begin(), pages.end(), [](const Page& p) { return p.pruned; });
+  field.left_out = left_out(o, table, stored, pruned, validity, field);
   field.textures = make_table(h, table, pages);
   for (HostTexture& pool : stores.pools) field.textures.push_back(std::move(pool));
   if (validity) field.textures.push_back(std::move(stores.validity));
-  field.host_peak_bytes = field.memory().total() + static_cast<std::int64_t>(pages.size() * sizeof(Page));
+  if (request.needs.draw_boxes) field.draw_tree = PageDrawTree(h, o.page_size, pages).tree();
+  field.host_peak_bytes =
+      field.memory().total() + static_cast<std::int64_t>(pages.size() * sizeof(Page)) + field.draw_tree.bytes();
   return field;
 }
 

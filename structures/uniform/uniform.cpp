@@ -3,17 +3,19 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "structures/build_tools.hpp"
 #include "structures/level_values.hpp"
+#include "structures/vertex_values.hpp"
 #include "uniform_layout.h"
 
 namespace amrtex {
 namespace {
 
-constexpr std::array<Filter, 2> kFilters{Filter::nearest, Filter::linear_page};
+constexpr std::array<Filter, 3> kFilters{Filter::nearest, Filter::linear_page, Filter::linear_vertex};
 constexpr int kBlock = AMRTEX_DENSE_BLOCK;
 
 struct Plan {
@@ -23,8 +25,9 @@ struct Plan {
   int fields;
   bool validity;
   bool ranges;
-  int border;  ///< texels round the domain: the fills of cells outside, which clamping gives only where no cell is missing
-  Box texels() const { return Box{Vec3i(0), cells}.grown(border); }
+  int border;     ///< texels round the domain: the fills of cells outside, which clamping gives only where no cell is missing
+  bool vertices;  ///< texels are vertices, not cells
+  Box texels() const { return vertices ? Box{Vec3i(0), cells + Vec3i(1)} : Box{Vec3i(0), cells}.grown(border); }
   std::int64_t cell_count() const { return std::int64_t{cells.x} * cells.y * cells.z; }
   std::int64_t block_count() const { return std::int64_t{blocks.x} * blocks.y * blocks.z; }
   /// Words of validity bits: each field's from a new word.
@@ -44,9 +47,11 @@ class Uniform final : public Encoding {
   }
   void check_parameters(const Json& parameters) const override { level(parameters, std::numeric_limits<int>::max()); }
   Support supported(const ContextInfo&) const override { return {}; }
+  Support level_of_detail() const override { return {false, "its one texture holds one level (parameter level)"}; }
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
+  EncodedField build_blocks(const AmrHierarchy& hierarchy, const BuildRequest& request) const;
   int level(const Json& parameters, int finest) const;
   Plan plan(const AmrHierarchy& hierarchy, const BuildRequest& request, const Json& parameters) const;
 };
@@ -68,14 +73,16 @@ Plan Uniform::plan(const AmrHierarchy& h, const BuildRequest& request, const Jso
   p.fields = request.field_count();
   p.validity = any_missing(h, request);
   p.ranges = request.needs.value_ranges;
-  p.border = p.validity && request.needs.filter != Filter::nearest ? 1 : 0;
+  p.vertices = request.needs.filter == Filter::linear_vertex;
+  p.border = p.validity && request.needs.filter == Filter::linear_page ? 1 : 0;
   const std::int64_t bytes = p.bytes(request.storage);
   require_budget(*this, bytes, request);
   const int limit = request.context.max_3d_texture_size;
-  if (std::max({p.cells.x, p.cells.y, p.cells.z}) + 2 * p.border > limit)
-    throw UnsupportedError(fmt::format(
-        "encoding uniform: level {} has {} x {} x {} cells ({} bytes), a 3D texture of this context at most {} along an axis",
-        p.level, p.cells.x, p.cells.y, p.cells.z, bytes, limit));
+  if (const Vec3i t = p.texels().size(); std::max({t.x, t.y, t.z}) > limit)
+    throw UnsupportedError(
+        fmt::format("encoding uniform: level {} has {} x {} x {} cells ({} bytes, {} x {} x {} texels), a 3D texture of this "
+                    "context at most {} along an axis",
+                    p.level, p.cells.x, p.cells.y, p.cells.z, bytes, t.x, t.y, t.z, limit));
   if (p.validity && 4 * p.validity_words() > request.context.max_buffer_bytes)
     throw UnsupportedError(fmt::format("encoding uniform: validity bits take {} bytes, a buffer of this context at most {}",
                                        4 * p.validity_words(), request.context.max_buffer_bytes));
@@ -124,21 +131,44 @@ class Writer {
 
  private:
   struct Contents {
-    ValueRange range;  ///< of the cells, the layer around them and their fills
+    ValueRange range;  ///< of the cells, the layer around them and their fills; or of the vertices
     bool any = false;  ///< has any cell a value?
   };
 
   Contents write_values(const Vec3i& b, int number) {
     const Box inner = intersection(Box{b * kBlock, (b + Vec3i(1)) * kBlock}, hierarchy_.domain(plan_.level));
+    if (plan_.vertices) return write_vertices(inner, number);
     const Box box = inner.grown(request_.needs.filter == Filter::nearest ? 0 : 1);
     std::vector<double> v(static_cast<std::size_t>(box.cells()));
     std::vector<std::uint8_t> missing(v.size());
     filled_level_values(hierarchy_, request_.field_at(number), plan_.level, box, v, missing);
-    Contents contents;
-    contents.any = mark_missing(inner, box, missing, number);
-    for (double value : v) contents.range.add(value);
+    const Contents contents{range_of(v), mark_missing(inner, box, missing, number)};
     store(inner, box, v, number);
     return contents;
+  }
+
+  Contents write_vertices(const Box& inner, int number) {
+    const int index = request_.field_at(number);
+    const Box own{inner.lower, inner.upper + Vec3i(1)};
+    // the rounding of the normalised coordinate lets the texture unit see a little of the next layer
+    const Box box = field_.filtering == Filtering::hardware ? intersection(own.grown(1), plan_.texels()) : own;
+    std::vector<double> v(static_cast<std::size_t>(box.cells()));
+    vertex_values(hierarchy_, index, plan_.level, box, v);
+    std::vector<std::uint8_t> missing(static_cast<std::size_t>(inner.cells()), 0);
+    if (hierarchy_.has_missing(index)) {
+      std::vector<double> cells(missing.size());
+      level_values(hierarchy_, index, plan_.level, inner, cells);
+      std::transform(cells.begin(), cells.end(), missing.begin(), [](double value) { return std::isnan(value) ? 1 : 0; });
+    }
+    const Contents contents{range_of(v), mark_missing(inner, inner, missing, number)};
+    store(inner, box, v, number);
+    return contents;
+  }
+
+  static ValueRange range_of(std::span<const double> values) {
+    ValueRange range;
+    for (const double value : values) range.add(value);
+    return range;
   }
 
   /// Has any cell of the block a value?
@@ -194,7 +224,19 @@ Storages make_storages(const Plan& p, const EncodedField& field) {
 }
 
 EncodedField Uniform::build(const AmrHierarchy& h, const BuildRequest& request) const {
+  if (!request.needs.draw_boxes) return build_blocks(h, request);
+  // the texture is one box; value ranges would divide it in regions
+  BuildRequest whole = request;
+  whole.needs.value_ranges = false;
+  EncodedField field = build_blocks(h, whole);
+  field.draw_tree.nodes.emplace_back();
+  field.draw_tree.set_box(0, h.domain(h.finest_level()), field.build_parameters.at("level"));
+  return field;
+}
+
+EncodedField Uniform::build_blocks(const AmrHierarchy& h, const BuildRequest& request) const {
   require_filter(*this, request.needs.filter);
+  require_level_of_detail(*this, request.needs);
   require_fields(*this, h, request);
   const Json parameters = complete_parameters(*this, request.parameters);
   const Plan p = plan(h, request, parameters);
@@ -203,6 +245,7 @@ EncodedField Uniform::build(const AmrHierarchy& h, const BuildRequest& request) 
   field.definition.page_level = p.level;
   field.shader.defines.emplace_back("AMRTEX_DENSE_LEVEL", p.level);
   field.shader.defines.emplace_back("AMRTEX_DENSE_BORDER", p.border);
+  field.shader.defines.emplace_back("AMRTEX_DENSE_VERTICES", p.vertices ? 1 : 0);
   field.integer_uniforms = {{"u_dense_cells", p.cells}, {"u_dense_blocks", p.blocks}};
 
   Storages out = make_storages(p, field);
@@ -224,7 +267,9 @@ EncodedField Uniform::build(const AmrHierarchy& h, const BuildRequest& request) 
   if (p.ranges)
     field.textures.push_back(std::move(out.ranges));
   else
-    field.left_out.push_back({"value ranges", "no region is skipped", 4 * p.block_count()});
+    field.left_out.push_back({"value ranges",
+                              request.needs.draw_boxes ? "the domain is drawn as one box" : "no region is skipped",
+                              4 * p.block_count()});
   field.statistics = {{"blocks", p.block_count()}};
   return field;
 }

@@ -7,9 +7,13 @@
 #ifndef AMRTEX_DENSE_BORDER
 #error AMRTEX_DENSE_BORDER must be defined: 1 where the texture holds the cells round the domain, else 0
 #endif
+#ifndef AMRTEX_DENSE_VERTICES
+#error AMRTEX_DENSE_VERTICES must be defined: 1 where texels are vertices, 0 where they are cells
+#endif
 #endif
 DEFINE_INT(AMRTEX_DENSE_LEVEL)
 DEFINE_INT(AMRTEX_DENSE_BORDER)
+DEFINE_INT(AMRTEX_DENSE_VERTICES)
 
 VALUE_TEXTURES(tex_dense, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)
 UNIFORM(ivec3, u_dense_cells)   // cells of the level
@@ -21,6 +25,11 @@ BUFFER(uint, dense_validity, dense_validity_block)  // one bit a cell, x fastest
 BUFFER(uint, dense_ranges, dense_ranges_block)  // coded value range a block
 #endif
 
+// Where q = 0 lies in the texture, in texels: a cell's centre is its texel's; a vertex sits on the corner, half a texel from its own.
+vec3r dense_first_texel(IN(ivec3) first) {
+  return vec3r(first + ivec3(AMRTEX_DENSE_BORDER)) + (AMRTEX_DENSE_VERTICES != 0 ? vec3r(0.5) : vec3r(0));
+}
+
 bool locate(IN(Position) p, OUT(Region) r) {
   r.level = AMRTEX_DENSE_LEVEL;
   r.width = level_width(AMRTEX_DENSE_LEVEL);
@@ -29,8 +38,8 @@ bool locate(IN(Position) p, OUT(Region) r) {
   r.value_range = vec2r(0);
   r.handle = ivec4(0);
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
-  r.texture_scale = vec3r(1) / vec3r(u_dense_cells + ivec3(2 * AMRTEX_DENSE_BORDER));
-  r.texture_lower = vec3r(AMRTEX_DENSE_BORDER) * r.texture_scale;
+  r.texture_scale = vec3r(1) / vec3r(u_dense_cells + ivec3(2 * AMRTEX_DENSE_BORDER + AMRTEX_DENSE_VERTICES));
+  r.texture_lower = dense_first_texel(ivec3(0)) * r.texture_scale;
 #endif
 #if AMRTEX_CPP || AMRTEX_VALUE_RANGES
   if (AMRTEX_VALUE_RANGES != 0) {
@@ -41,7 +50,7 @@ bool locate(IN(Position) p, OUT(Region) r) {
     ivec3 first = block * AMRTEX_DENSE_BLOCK;
     r.handle = ivec4(first.x, first.y, first.z, 0);
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
-    r.texture_lower = vec3r(first + ivec3(AMRTEX_DENSE_BORDER)) * r.texture_scale;
+    r.texture_lower = dense_first_texel(first) * r.texture_scale;
 #endif
     uint code = dense_ranges[block.x + u_dense_blocks.x * (block.y + u_dense_blocks.y * block.z)];
     r.value_range = decode_range(code);
@@ -52,7 +61,7 @@ bool locate(IN(Position) p, OUT(Region) r) {
 }
 
 real dense_texel(IN(int) field, IN(ivec3) cell) {
-  ivec3 last = u_dense_cells + ivec3(2 * AMRTEX_DENSE_BORDER - 1);
+  ivec3 last = u_dense_cells + ivec3(2 * AMRTEX_DENSE_BORDER + AMRTEX_DENSE_VERTICES - 1);
   return texelFetch(tex_dense[field], clamp(cell + ivec3(AMRTEX_DENSE_BORDER), ivec3(0), last), 0).x;
 }
 
@@ -75,9 +84,9 @@ real fetch_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
   return decode_value(textureLod(tex_dense[field], r.texture_lower + q * r.texture_scale, 0.0).x, field);
 #else
-  PRECISE vec3r from_centre = q - vec3r(0.5);
-  vec3r whole = floor(from_centre);
-  vec3r f = from_centre - whole;
+  PRECISE vec3r from_first = AMRTEX_DENSE_VERTICES != 0 ? q : q - vec3r(0.5);
+  vec3r whole = floor(from_first);
+  vec3r f = from_first - whole;
   ivec3 i = first + ivec3(whole);
   return decode_value(trilinear(dense_texel(field, i), dense_texel(field, i + ivec3(1, 0, 0)), dense_texel(field, i + ivec3(0, 1, 0)),
                                 dense_texel(field, i + ivec3(1, 1, 0)), dense_texel(field, i + ivec3(0, 0, 1)),

@@ -87,6 +87,52 @@ TEST(Uniform, NearestOfACoarserLevelIsThatLevelsValue) {
   EXPECT_TRUE(result) << result;
 }
 
+TEST(Uniform, OfVerticesHasOneTexelMoreAlongEachAxis) {
+  const AmrHierarchy h = holes_and_missing(waves).hierarchy();
+  const EncodedField field = uniform_field(h, Filter::linear_vertex);
+  EXPECT_EQ(field.find("tex_dense")->size, Vec3i(17));
+  EXPECT_EQ(field.memory().payload, 4 * 16 * 16 * 16);
+  EXPECT_EQ(field.memory().duplicated, 4 * (17 * 17 * 17 - 16 * 16 * 16));
+}
+
+TEST(Uniform, OfVerticesHasTheBitsOfOtherEncodingsWhereLeavesAreFinest) {
+  // at positions of the lattice: the same 8 floats between the same fractions; in a coarser leaf its interpolant is
+  // sampled at finer vertices first
+  for (const auto& h : {nested(waves).hierarchy(), nested(waves, {4, 2}).hierarchy(), jump_of_two(waves).hierarchy(),
+                        holes_and_missing(waves).hierarchy()}) {
+    auto positions = probe_positions(h, 60);
+    for (FinestPosition& p : positions) p.fraction = (glm::floor(p.fraction * 4096.0) + 0.5) / 4096.0;
+    Context& gl = context(ContextKind::egl);
+    const auto probe = [&](const EncodedField& f) { return probe_on_gl(gl, h, f, GpuField(f, gl), positions); };
+    const auto dense = probe(uniform_field(h, Filter::linear_vertex));
+    const auto tree = probe(build(h, {&find_encoding("kd_tree"), Filter::linear_vertex, Json::object()}));
+    const Comparison result = compare(positions, values_of(tree), dense, [&](std::size_t i) {
+      const auto leaf = h.find_leaf(positions[i].cell);
+      return leaf && leaf->level == h.finest_level() ? 0 : 1e-6 * value_range(h);
+    });
+    EXPECT_TRUE(result) << result;
+    EXPECT_GT(result.worst, 0) << "leaves of coarser levels were probed";
+  }
+}
+
+TEST(Uniform, OfVerticesOfACoarserLevelIsTheFilterOfTheMeshCutOffThere) {
+  // levels 0 and 1 of the mesh, whose refined cells hold the means of what was cut off
+  const AmrHierarchy h = nested(waves).hierarchy();
+  MeshBuilder cut({8, 7, 8}, {2});
+  for (int level = 0; level < 2; ++level)
+    for (const Patch& patch : h.patches(level)) cut.patch(level, patch.box, patch.values[0]);
+  const AmrHierarchy coarse = cut.hierarchy();
+  const auto positions = probe_positions(h, 60);
+  const HierarchyReference reference(coarse, 0, {Filter::linear_vertex});
+  Values expected;
+  for (const FinestPosition& p : positions)
+    expected.push_back(reference.sample(FinestPosition{p.cell / 2, (Vec3d(p.cell % 2) + p.fraction) / 2.0}));
+  const EncodedField field = uniform_field(h, Filter::linear_vertex, {{"level", 1}}, {.storage = Storage::r64f});
+  EXPECT_EQ(field.find("tex_dense")->size, h.cells(1) + Vec3i(1));
+  const Comparison result = compare(positions, expected, probe_on_cpu(h, field, Precision::double_precision, positions), 1e-12);
+  EXPECT_TRUE(result) << result;
+}
+
 TEST(Uniform, KeepsValidityBitsAndABorderOnlyWhereCellsAreMissing) {
   // 16^3 cells of the finest level: 4096 bits in 128 words; a layer round them where a linear filter sees fills
   const AmrHierarchy h = holes_and_missing(waves).hierarchy();

@@ -1,0 +1,149 @@
+// Every registered encoding with every filter that it lists. Nothing here names an encoding or a
+// parameter of one. Tests use it too.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cctype>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "bench/verify/meshes.hpp"
+#include "structures/encoding.hpp"
+
+namespace amrtex::verify {
+
+struct EncodingCase {
+  const Encoding* encoding;
+  Filter filter;
+  Json parameters;
+  ContextInfo limits = {};  ///< of the context that it is for
+
+  std::string name() const { return fmt::format("{} {} {}", encoding->name(), filter_name(filter), parameters.dump()); }
+  /// Filterings that make a difference and that the encoding has.
+  std::vector<Filtering> filterings() const;
+};
+
+struct BuildOptions {
+  Storage storage = Storage::r32f;
+  Filtering filtering = Filtering::manual;
+  bool value_ranges = true;
+  int field = 0;
+  std::vector<int> more_fields = {};
+  std::optional<ContextInfo> limits = {};  ///< of another context than the case's
+  bool draw_boxes = false;
+  bool level_of_detail = false;
+  bool everything = false;
+  std::vector<std::array<double, 2>> invisible = {};
+};
+
+/// What a context says of handles of textures, and no other limit of it.
+inline ContextInfo handle_limits(const ContextInfo& info) {
+  ContextInfo limits;
+  limits.bindless_texture = info.bindless_texture;
+  limits.shader_ballot = info.shader_ballot;
+  limits.handles_may_differ = info.handles_may_differ;
+  limits.max_resident_handles = info.max_resident_handles;
+  return limits;
+}
+
+/// Throws UnsupportedError for a mesh or combination that the encoding refuses.
+inline EncodedField build(const AmrHierarchy& h, const EncodingCase& c, const BuildOptions& options = {}) {
+  BuildRequest request;
+  request.field = options.field;
+  request.more_fields = options.more_fields;
+  request.storage = options.storage;
+  request.needs.filter = c.filter;
+  request.needs.filtering = options.filtering;
+  request.needs.value_ranges = options.value_ranges;
+  request.needs.draw_boxes = options.draw_boxes;
+  request.needs.level_of_detail = options.level_of_detail;
+  request.needs.everything = options.everything;
+  request.needs.invisible = options.invisible;
+  request.parameters = c.parameters;
+  request.context = options.limits.value_or(c.limits);
+  return c.encoding->build(h, request);
+}
+
+/// Does the encoding take this mesh? What it refuses is a record `unsupported` and no failure.
+inline bool accepted(const AmrHierarchy& h, const EncodingCase& c, const BuildOptions& options = {}) {
+  try {
+    build(h, c, options);
+    return true;
+  } catch (const UnsupportedError&) {
+    return false;
+  }
+}
+
+inline bool accepted(const EncodingCase& c, const BuildOptions& options = {}) {
+  static const AmrHierarchy mesh = nested(waves).hierarchy();
+  return accepted(mesh, c, options);
+}
+
+inline std::vector<Filtering> EncodingCase::filterings() const {
+  std::vector<Filtering> all{Filtering::manual};
+  if (filter != Filter::nearest && accepted(*this, {.filtering = Filtering::hardware})) all.push_back(Filtering::hardware);
+  return all;
+}
+
+/// The values that a parameter's description spells out: its numbers and its quoted names.
+inline std::vector<Json> declared_values(const ParameterInfo& p) {
+  std::vector<Json> values;
+  const std::string& text = p.accepted;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (std::isdigit(static_cast<unsigned char>(text[i])) != 0) {
+      std::size_t digits = 0;
+      values.emplace_back(std::stoi(text.substr(i), &digits));
+      i += digits;
+    } else if (text[i] == '"') {
+      const std::size_t end = text.find('"', i + 1);
+      if (end == std::string::npos) break;
+      values.emplace_back(text.substr(i + 1, end - i - 1));
+      i = end;
+    }
+  }
+  return values;
+}
+
+/// The defaults where they take the filter, else the first declared value of a parameter that does.
+inline EncodingCase default_case(const Encoding& encoding, Filter filter, const ContextInfo& limits = {}) {
+  EncodingCase c{&encoding, filter, Json::object(), limits};
+  if (accepted(c)) return c;
+  for (const ParameterInfo& p : encoding.parameters())
+    for (const Json& value : declared_values(p)) {
+      const EncodingCase other{&encoding, filter, Json{{p.name, value}}, limits};
+      if (accepted(other)) return other;
+    }
+  throw Error(fmt::format("encoding {}: lists the filter {} and no parameter takes it", encoding.name(), filter_name(filter)));
+}
+
+/// The default case, and with it every declared name and the two smallest declared numbers of each parameter.
+inline std::vector<EncodingCase> variants(const Encoding& encoding, Filter filter, const ContextInfo& limits = {}) {
+  const EncodingCase base = default_case(encoding, filter, limits);
+  std::vector<EncodingCase> cases{base};
+  for (const ParameterInfo& p : encoding.parameters()) {
+    int numbers = 0;
+    for (const Json& value : declared_values(p)) {
+      if (value.is_number() && ++numbers > 2) continue;
+      EncodingCase c = base;
+      c.parameters[p.name] = value;
+      if (value != p.default_value && c.parameters != base.parameters && accepted(c)) cases.push_back(std::move(c));
+    }
+  }
+  return cases;
+}
+
+/// All cases of a context whose parameters hold the word `slice`.
+inline std::vector<EncodingCase> make_encoding_cases(const ContextInfo& limits, std::string_view slice = "") {
+  std::vector<EncodingCase> all;
+  for (const Encoding* e : all_encodings())
+    for (const Filter filter : e->filters())
+      for (EncodingCase& c : variants(*e, filter, limits))
+        if (c.parameters.dump().find(slice) != std::string::npos) all.push_back(std::move(c));
+  return all;
+}
+
+}  // namespace amrtex::verify
