@@ -13,6 +13,7 @@
 #include "kd_draw_tree.hpp"
 #include "kd_partition.hpp"
 #include "start_grid.hpp"
+#include "structures/brick_packing.hpp"
 #include "structures/build_tools.hpp"
 #include "structures/level_values.hpp"
 #include "structures/texture_handles.hpp"
