@@ -184,6 +184,11 @@ void fetch_stencil(IN(Region) r, IN(ivec3) octant, OUT(Stencil) s) {
 }
 #endif
 
+// Optional: level of the leaf cell that holds a position of the region, where that is not the region's own.
+#ifndef AMRTEX_LEAF_LEVEL
+#define AMRTEX_LEAF_LEVEL(r) (r).level
+#endif
+
 // Optional: `vec3r fetch_gradient(Region r, vec3r q)`, the stored gradient of f per cell width of r along each axis,
 // and AMRTEX_STORED_GRADIENTS: were any stored?
 #ifndef AMRTEX_FETCH_GRADIENT
@@ -213,7 +218,7 @@ bool sample_value(IN(Position) p, IN(int) field, OUT(FieldSample) s) {
   if (any(lessThan(p.cell, ivec3(0))) || any(greaterThanEqual(p.cell, u_domain_cells))) return false;
   if (!locate(p, r)) return false;
   s.value = fetch_value(r, field, region_position(r, p));
-  s.level = r.level;
+  s.level = AMRTEX_LEAF_LEVEL(r);
   if (AMRTEX_VALIDITY != 0 && is_no_value(s.value)) return false;
   return true;
 }

@@ -69,6 +69,9 @@ VALUE_TEXTURES(tex_exa_pool, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)
 
 // ---- locating
 
+// A region is as fine as its finest hats; differences for normals are taken over the leaf's own cells.
+#define AMRTEX_LEAF_LEVEL(r) int((r).brick.w)
+
 int exa_axis(IN(uint) word) { return int(word >> uint(AMRTEX_EXA_CHILD_BITS)); }
 int exa_first_child(IN(uint) word) { return int(word & ((1u << uint(AMRTEX_EXA_CHILD_BITS)) - 1u)); }
 int exa_component(IN(ivec3) v, IN(int) axis) { return axis == 0 ? v.x : (axis == 1 ? v.y : v.z); }
@@ -169,6 +172,7 @@ bool locate(IN(Position) p, OUT(Region) r) {
   r.width = 1;
   r.value_range = vec2r(0);
   r.handle = ivec4(0);
+  r.brick = uvec4(0u);
   r.texture_lower = vec3r(0);
   r.texture_scale = vec3r(0);
   if (region == AMRTEX_EXA_NO_REGION) return false;
@@ -180,6 +184,7 @@ bool locate(IN(Position) p, OUT(Region) r) {
   r.level = int((about >> uint(AMRTEX_EXA_PIECE_BITS + 1)) & uint((1 << AMRTEX_EXA_LEVEL_BITS) - 1));
   r.width = level_width(r.level);
   if (AMRTEX_VALUE_RANGES != 0) r.value_range = decode_range(exa_regions[at + 3]);
+  r.brick.w = place.w;
   r.handle.x = int(store.z);
   r.handle.y = int(store.w);
   r.handle.z = AMRTEX_EXA_CELLS != 0 ? brick : int(exa_regions[at + 1]);
