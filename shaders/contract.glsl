@@ -170,6 +170,15 @@ bool level_suffices(IN(ivec3) lower, IN(ivec3) upper, IN(int) level, IN(int) nex
 
 #include AMRTEX_ENCODING_FILE
 
+// Optional: `locate` in steps, for a march that skips: the box and value range of a group of regions about p, which a march passes as one where
+// none can be seen; the region's own box and value range; and what samples in it need.
+#ifndef AMRTEX_STAGED_LOCATE
+#define AMRTEX_STAGED_LOCATE false
+int locate_group(IN(Position) p, INOUT(Region) r) { return 0; }
+bool locate_in_group(IN(Position) p, IN(int) group, INOUT(Region) r) { return locate(p, r); }
+void open_region(INOUT(Region) r) {}
+#endif
+
 // The drawn field: number 0, of which ranges, constants and skipping speak.
 real fetch_field(IN(Region) r, IN(vec3r) q) { return fetch_value(r, 0, q); }
 
@@ -189,8 +198,8 @@ void fetch_stencil(IN(Region) r, IN(ivec3) octant, OUT(Stencil) s) {
 #define AMRTEX_LEAF_LEVEL(r) (r).level
 #endif
 
-// Optional: `vec3r fetch_gradient(Region r, vec3r q)`, the stored gradient of f per cell width of r along each axis,
-// and AMRTEX_STORED_GRADIENTS: were any stored?
+// Optional: `vec3r fetch_gradient(Region r, vec3r q)`, the gradient of f per cell width of r along each axis, and
+// AMRTEX_STORED_GRADIENTS: are they stored, and any there? Else they are the derivative of f (Encoding::analytic_gradients).
 #ifndef AMRTEX_FETCH_GRADIENT
 #define AMRTEX_FETCH_GRADIENT 0
 #define AMRTEX_STORED_GRADIENTS false
@@ -208,6 +217,11 @@ vec3r region_position(IN(Region) r, IN(Position) p) {
   PRECISE vec3r rest = (vec3r(from_corner - whole * r.width) + p.fraction) / real(r.width);
   PRECISE vec3r q = min(vec3r(whole) + rest, vec3r(whole + ivec3(1)) * AMRTEX_BELOW_ONE);
   return q;
+}
+
+// q inside a region: at most so far from its lower corner that rounding does not carry it through a face.
+vec3r inside_region(IN(Region) r, IN(vec3r) q) {
+  return clamp(q, vec3r(0), vec3r(r.upper - r.lower) / real(r.width) * AMRTEX_BELOW_ONE);
 }
 
 // Field number `field` (a constant at every call) at a position; false where it has no value.

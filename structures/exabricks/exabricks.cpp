@@ -49,7 +49,6 @@ struct Plan {
   std::vector<std::int64_t> leaf_region;  ///< of an item of the BVH; -1: no mesh
   std::vector<std::int64_t> first_piece;  ///< of a region, among those that are stored
   std::int64_t stored_pieces = 0;
-  int region_words = 3;
   bool missing = false;  ///< do bricks hold cells without value?
   Vec3i texel_bits{0};   ///< of a packed texel
   std::int64_t validity_words = 0;
@@ -178,13 +177,16 @@ class Exabricks final : public Encoding {
         {"brick_width", "cells of a brick along an axis, at most", 32,
          fmt::format("an integer from {} to {}", kNarrowestBrick, kWidestBrick)},
         {"border", "texels around a brick that hold its neighbours' cells (filter basis)", 1, "0 or 1"},
-        {"traversal", "how the region of a place is found: down the planes from a grid's cell or from the root, or through a BVH",
-         "grid", "\"grid\", \"kd\" or \"bvh\""},
         {"locate", "who finds the cells of a sample (filter basis): its region knows them, or each sample searches", "regions",
-         "\"regions\" or \"cells\""}};
+         "\"regions\" or \"cells\""},
+        {"traversal", "how the region of a place is found: down the planes from a grid's cell or from the root, or through a BVH",
+         "grid", "\"grid\", \"kd\" or \"bvh\""}};
   }
   void check_parameters(const Json& parameters) const override { options(parameters, Filter::basis); }
   Support supported(const ContextInfo&) const override { return {}; }
+  Support analytic_gradients(Filter filter) const override {
+    return filter == Filter::basis ? Support{} : Support{false, "a value a cell has no derivative"};
+  }
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
@@ -289,15 +291,16 @@ void Exabricks::plan_traversal(const AmrHierarchy& h, const BuildRequest& reques
 /// Exact bytes against the limits of the context and of the user, before anything is allocated.
 void Exabricks::require_sizes(const BuildRequest& request, const Options& o, const Plan& p) const {
   const auto nodes = static_cast<std::int64_t>(p.set.nodes.size());
-  const std::array<std::pair<const char*, std::int64_t>, 9> buffers{
-      {{"regions", 4 * std::max<std::int64_t>(p.region_words * p.regions(), 1)},
-       {"bricks", 32 * std::max<std::int64_t>(p.bricks(), 1)},
+  const std::array<std::pair<const char*, std::int64_t>, 10> buffers{
+      {{"regions", 32 * std::max<std::int64_t>(p.regions(), 1)},
+       {"value ranges", request.needs.value_ranges ? 4 * std::max<std::int64_t>(p.regions(), 1) : 0},
+       {"bricks", o.cells ? 32 * std::max<std::int64_t>(p.bricks(), 1) : 0},
        {"pieces", o.hats && !o.cells ? 16 * std::max<std::int64_t>(p.stored_pieces, 1) : 0},
        {"nodes over the regions", o.traversal == Traversal::bvh ? 0 : 8 * nodes},
        {"the BVH over the regions", 32 * static_cast<std::int64_t>(p.bvh.size())},
        {"the start grid", 4 * static_cast<std::int64_t>(p.grid.entries.size())},
        {"the start grid's nodes", 32 * static_cast<std::int64_t>(p.grid.nodes.size())},
-       {"nodes over the bricks", o.cells ? 16 * static_cast<std::int64_t>(p.tree.nodes.size()) : 0},
+       {"nodes over the bricks", o.cells ? 32 * static_cast<std::int64_t>(p.tree.nodes.size()) : 0},
        {"validity bits", 4 * request.field_count() * p.validity_words}}};
   const std::string remedy = o.brick_width < kWidestBrick
                                  ? fmt::format("; a brick_width above {} makes fewer, up to {}", o.brick_width, kWidestBrick)
@@ -336,10 +339,6 @@ Plan Exabricks::plan(const AmrHierarchy& h, const BuildRequest& request, const O
         fmt::format("encoding exabricks: {} levels, a region tells at most {}", h.level_count(), 1 << AMRTEX_EXA_LEVEL_BITS));
   Plan p;
   p.tree = build_bricks(h, o.brick_width);
-  if (o.cells && p.tree.depth + 2 > AMRTEX_EXA_STACK)
-    throw UnsupportedError(
-        fmt::format("encoding exabricks: locate cells searches at most {} planes deep, this mesh's bricks take {}",
-                    AMRTEX_EXA_STACK - 2, p.tree.depth));
   p.set = build_regions(h, p.tree, {o.border, o.hats, !o.cells});
   if (p.set.nodes.size() >= std::size_t{1} << AMRTEX_EXA_CHILD_BITS)
     throw UnsupportedError(fmt::format("encoding exabricks: {} nodes over {} regions, a child's index has {} bits",
@@ -347,12 +346,14 @@ Plan Exabricks::plan(const AmrHierarchy& h, const BuildRequest& request, const O
   for (int number = 0; number < request.field_count(); ++number)
     p.missing = p.missing || h.statistics(request.field_at(number)).cells_without_value > 0;
   for (const Region& r : p.set.regions) {
+    if (r.pieces >= 1 << AMRTEX_EXA_PIECE_BITS)
+      throw UnsupportedError(fmt::format("encoding exabricks: {} pieces reach into one region, it tells less than {}", r.pieces,
+                                         1 << AMRTEX_EXA_PIECE_BITS));
     p.first_piece.push_back(p.stored_pieces);
     if (!p.keeps_pieces(o, r)) continue;
     p.stored_pieces += r.pieces;
     require_offsets(h, p, r);
   }
-  p.region_words = request.needs.value_ranges ? 4 : 3;
   plan_pool(request, o, p);
   plan_traversal(h, request, o, p);
   require_sizes(request, o, p);
@@ -385,30 +386,6 @@ Stores store_bricks(const AmrHierarchy& h, const BuildRequest& request, const Op
   return out;
 }
 
-HostTexture make_regions(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& p,
-                         const EncodedField& field, const Stores& stores) {
-  HostTexture regions = make_buffer("exa_regions", TexelFormat::r32ui, p.region_words * p.regions());
-  const HostTexture& pool = stores.pools.front();
-  const double leak = pool.hardware_linear ? leaked_value(h.statistics(request.field), pool.size) : 0;
-  tbb::parallel_for(std::size_t{0}, p.set.regions.size(), [&](std::size_t i) {
-    const Region& r = p.set.regions[i];
-    RegionFacts facts;
-    if (p.missing || request.needs.value_ranges) facts = region_facts(p, o.border, r, stores, field.scale);
-    const bool plain = r.plain && (!o.hats || !facts.missing);
-    auto* words = regions.as<std::uint32_t>() + i * static_cast<std::size_t>(p.region_words);
-    words[0] = static_cast<std::uint32_t>(r.brick);
-    words[1] = static_cast<std::uint32_t>(p.first_piece[i]);
-    words[2] = static_cast<std::uint32_t>(r.pieces) | static_cast<std::uint32_t>(r.level) << (AMRTEX_EXA_PIECE_BITS + 1) |
-               (plain ? AMRTEX_EXA_PLAIN_FLAG : 0U) | (facts.missing ? AMRTEX_EXA_MISSING_FLAG : 0U) |
-               (r.own ? AMRTEX_EXA_OWN_FLAG : 0U);
-    if (p.region_words < 4) return;
-    words[3] = facts.range.empty() ? kVacantRange
-                                   : encode_range({facts.range.min - leak, facts.range.max + leak}, field.range_origin,
-                                                  request.storage, field.scale);
-  });
-  return regions;
-}
-
 std::uint32_t packed_texel(const Plan& p, const Vec3i& texel) {
   return static_cast<std::uint32_t>(texel.x) | static_cast<std::uint32_t>(texel.y) << p.texel_bits.x |
          static_cast<std::uint32_t>(texel.z) << (p.texel_bits.x + p.texel_bits.y);
@@ -417,6 +394,75 @@ std::uint32_t packed_texel(const Plan& p, const Vec3i& texel) {
 std::uint32_t packed_size(const Vec3i& size) {
   return static_cast<std::uint32_t>(size.x) | static_cast<std::uint32_t>(size.y) << AMRTEX_EXA_SIZE_BITS |
          static_cast<std::uint32_t>(size.z) << (2 * AMRTEX_EXA_SIZE_BITS);
+}
+
+/// The regions as the shader reads them, and what is known of their cells.
+struct RegionTables {
+  HostTexture regions, ranges;
+  std::vector<RegionFacts> facts;
+  double leak = 0;
+};
+
+/// What a group of regions may hold, coded: with holes or missing cells any value, since rays may not pass it as if it had a
+/// side.
+constexpr std::uint32_t kAnyRange = 0x7f80ff80U;
+
+std::uint32_t coded_range(const BuildRequest& request, const EncodedField& field, const RegionFacts& facts, double leak) {
+  if (facts.range.empty()) return kVacantRange;
+  return encode_range({facts.range.min - leak, facts.range.max + leak}, field.range_origin, request.storage, field.scale);
+}
+
+RegionTables make_regions(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& p,
+                          const EncodedField& field, const Stores& stores) {
+  RegionTables out;
+  out.regions = make_buffer("exa_regions", TexelFormat::rgba32ui, 2 * p.regions());
+  if (request.needs.value_ranges) out.ranges = make_buffer("exa_ranges", TexelFormat::r32ui, p.regions());
+  out.facts.resize(p.set.regions.size());
+  const HostTexture& pool = stores.pools.front();
+  out.leak = pool.hardware_linear ? leaked_value(h.statistics(request.field), pool.size) : 0;
+  tbb::parallel_for(std::size_t{0}, p.set.regions.size(), [&](std::size_t i) {
+    const Region& r = p.set.regions[i];
+    const auto brick = static_cast<std::size_t>(r.brick);
+    const Brick& b = p.tree.bricks[brick];
+    RegionFacts& facts = out.facts[i];
+    if (p.missing || request.needs.value_ranges) facts = region_facts(p, o.border, r, stores, field.scale);
+    const bool plain = r.plain && (!o.hats || !facts.missing);
+    auto* words = out.regions.as<std::uint32_t>() + i * 8;
+    words[0] = packed_texel(p, p.packing.at[brick] + Vec3i(o.border));
+    words[1] = packed_size(b.cells.size());
+    words[2] = static_cast<std::uint32_t>(p.first_piece[i]);
+    words[3] = static_cast<std::uint32_t>(r.pieces) | static_cast<std::uint32_t>(b.level) << AMRTEX_EXA_PIECE_BITS |
+               static_cast<std::uint32_t>(r.level) << (AMRTEX_EXA_PIECE_BITS + AMRTEX_EXA_LEVEL_BITS + 1) |
+               (plain ? AMRTEX_EXA_PLAIN_FLAG : 0U) | (facts.missing ? AMRTEX_EXA_MISSING_FLAG : 0U) |
+               (r.own ? AMRTEX_EXA_OWN_FLAG : 0U);
+    for (int a = 0; a < 3; ++a) words[4 + a] = static_cast<std::uint32_t>(b.box().lower[a]);
+    words[7] = static_cast<std::uint32_t>(r.brick);
+    if (request.needs.value_ranges) out.ranges.as<std::uint32_t>()[i] = coded_range(request, field, facts, out.leak);
+  });
+  return out;
+}
+
+/// Of all regions below each node; `missing` where there are holes or cells without value.
+std::vector<RegionFacts> facts_of_nodes(const Plan& p, const std::vector<RegionFacts>& regions) {
+  std::vector<RegionFacts> nodes(p.set.nodes.size());
+  for (std::size_t i = nodes.size(); i-- > 0;) {
+    const RegionNode& n = p.set.nodes[i];
+    if (n.first_child == 0) {
+      if (n.region < 0)
+        nodes[i].missing = true;
+      else
+        nodes[i] = regions[static_cast<std::size_t>(n.region)];
+      continue;
+    }
+    for (const int child : {n.first_child, n.first_child + 1}) {
+      const RegionFacts& part = nodes[static_cast<std::size_t>(child)];
+      nodes[i].missing = nodes[i].missing || part.missing;
+      if (part.range.empty()) continue;
+      nodes[i].range.add(part.range.min);
+      nodes[i].range.add(part.range.max);
+    }
+  }
+  return nodes;
 }
 
 HostTexture make_bricks(const Options& o, const Plan& p) {
@@ -482,26 +528,60 @@ HostTexture make_bvh(const Plan& p) {
   return bvh;
 }
 
-HostTexture make_brick_nodes(const BrickTree& tree) {
-  HostTexture nodes = make_buffer("exa_brick_nodes", TexelFormat::rgba32ui, static_cast<std::int64_t>(tree.nodes.size()));
-  auto* words = nodes.as<std::uint32_t>();
-  for (const BrickNode& n : tree.nodes) {
-    *words++ = static_cast<std::uint32_t>(n.first_child) | static_cast<std::uint32_t>(n.axis) << AMRTEX_EXA_CHILD_BITS;
-    *words++ = static_cast<std::uint32_t>(n.plane);
-    *words++ = static_cast<std::uint32_t>(n.widest);
-    *words++ = static_cast<std::uint32_t>(n.brick + 1);
-  }
-  return nodes;
-}
+/// The bricks' tree depth first, each node with the box of the supports below it, outwards to whole cells; nodes without mesh
+/// left out.
+class BrickNodeWriter {
+ public:
+  explicit BrickNodeWriter(const BrickTree& tree) : tree_(tree) { add(0); }
 
-void add_start_grid(const AmrHierarchy& h, const Plan& p, EncodedField& field) {
+  HostTexture texture() {
+    HostTexture nodes = make_buffer("exa_brick_nodes", TexelFormat::rgba32ui, 2 * static_cast<std::int64_t>(tree_.nodes.size()));
+    auto* words = nodes.as<std::uint32_t>();
+    for (const Entry& e : entries_) {
+      const bool last = e.next == entries_.size();
+      write_box(e.box, static_cast<std::uint32_t>(e.brick + 1), last ? 0U : static_cast<std::uint32_t>(e.next), words);
+      words += 8;
+    }
+    return nodes;
+  }
+
+ private:
+  struct Entry {
+    Box box;
+    int brick = -1;
+    std::size_t next = 0;
+  };
+
+  void add(std::size_t node) {
+    const BrickNode& n = tree_.nodes[node];
+    if (n.widest == 0) return;
+    const std::size_t i = entries_.size();
+    entries_.push_back({n.box.grown((n.widest + 1) / 2), n.brick});
+    if (n.first_child != 0) {
+      add(static_cast<std::size_t>(n.first_child));
+      add(static_cast<std::size_t>(n.first_child) + 1);
+    }
+    entries_[i].next = entries_.size();
+  }
+
+  const BrickTree& tree_;
+  std::vector<Entry> entries_;
+};
+
+void add_start_grid(const AmrHierarchy& h, const BuildRequest& request, const Plan& p, const RegionTables& tables,
+                    EncodedField& field) {
   HostTexture entries = make_buffer("exa_start", TexelFormat::r32ui, static_cast<std::int64_t>(p.grid.entries.size()));
   std::copy(p.grid.entries.begin(), p.grid.entries.end(), entries.as<std::uint32_t>());
   HostTexture nodes = make_buffer("exa_start_nodes", TexelFormat::rgba32ui, 2 * static_cast<std::int64_t>(p.grid.nodes.size()));
   const std::vector<Box> boxes = kd::node_boxes(h, as_kd_tree(h, p.set));
   auto* words = nodes.as<std::uint32_t>();
+  std::vector<RegionFacts> facts;
+  if (request.needs.value_ranges) facts = facts_of_nodes(p, tables.facts);
   for (const std::uint32_t node : p.grid.nodes) {
-    write_box(boxes[node], node, 0, words);
+    const std::uint32_t range = facts.empty()         ? 0U
+                                : facts[node].missing ? kAnyRange
+                                                      : coded_range(request, field, facts[node], tables.leak);
+    write_box(boxes[node], node, range, words);
     words += 8;
   }
   field.textures.push_back(std::move(entries));
@@ -520,7 +600,6 @@ void add_defines(const Options& o, const Plan& p, EncodedField& field) {
   defines.emplace_back("AMRTEX_EXA_BVH", o.traversal == Traversal::bvh ? 1 : 0);
   defines.emplace_back("AMRTEX_EXA_CELLS", o.cells ? 1 : 0);
   defines.emplace_back("AMRTEX_EXA_BORDER", o.border);
-  defines.emplace_back("AMRTEX_EXA_REGION_WORDS", p.region_words);
   defines.emplace_back("AMRTEX_EXA_MISSING", p.missing ? 1 : 0);
   defines.emplace_back("AMRTEX_EXA_X_BITS", p.texel_bits.x);
   defines.emplace_back("AMRTEX_EXA_Y_BITS", p.texel_bits.y);
@@ -560,10 +639,9 @@ Json statistics(const Options& o, const Plan& p) {
   json["most_pieces"] = most;
   json["plain_regions"] = plain;
   json["plain_volume"] = plain_volume / all;
-  json["region_bytes"] = 4 * p.region_words * p.regions() + 16 * p.stored_pieces +
+  json["region_bytes"] = 36 * p.regions() + 16 * p.stored_pieces +
                          (o.traversal == Traversal::bvh ? 32 * static_cast<std::int64_t>(p.bvh.size())
                                                         : 8 * static_cast<std::int64_t>(p.set.nodes.size()) + p.grid.bytes());
-  json["brick_bytes"] = 32 * p.bricks();
   json["nodes"] =
       o.traversal == Traversal::bvh ? static_cast<std::int64_t>(p.bvh.size()) : static_cast<std::int64_t>(p.set.nodes.size());
   json["depth"] = p.set.depth;
@@ -604,15 +682,19 @@ EncodedField Exabricks::build(const AmrHierarchy& h, const BuildRequest& request
   field.statistics = statistics(o, p);
   add_defines(o, p, field);
   field.left_out = left_out(request, o, p);
-  field.textures.push_back(make_regions(h, request, o, p, field, stores));
-  field.textures.push_back(make_bricks(o, p));
+  RegionTables tables = make_regions(h, request, o, p, field, stores);
   if (o.hats && !o.cells) field.textures.push_back(make_pieces(h, o, p));
   if (o.traversal == Traversal::bvh)
     field.textures.push_back(make_bvh(p));
   else
     field.textures.push_back(make_nodes(p.set));
-  if (o.traversal == Traversal::grid) add_start_grid(h, p, field);
-  if (o.cells) field.textures.push_back(make_brick_nodes(p.tree));
+  if (o.traversal == Traversal::grid) add_start_grid(h, request, p, tables, field);
+  field.textures.push_back(std::move(tables.regions));
+  if (request.needs.value_ranges) field.textures.push_back(std::move(tables.ranges));
+  if (o.cells) {
+    field.textures.push_back(make_bricks(o, p));
+    field.textures.push_back(BrickNodeWriter(p.tree).texture());
+  }
   for (HostTexture& pool : stores.pools) field.textures.push_back(std::move(pool));
   if (p.missing) field.textures.push_back(std::move(stores.validity));
   field.host_peak_bytes =

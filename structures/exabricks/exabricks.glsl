@@ -16,9 +16,6 @@
 #ifndef AMRTEX_EXA_BORDER
 #error AMRTEX_EXA_BORDER must be defined: texels around a brick
 #endif
-#ifndef AMRTEX_EXA_REGION_WORDS
-#error AMRTEX_EXA_REGION_WORDS must be defined: words of a region
-#endif
 #ifndef AMRTEX_EXA_MISSING
 #error AMRTEX_EXA_MISSING must be defined: 1 where bricks hold cells without value, else 0
 #endif
@@ -34,7 +31,6 @@ DEFINE_INT(AMRTEX_EXA_GRID)
 DEFINE_INT(AMRTEX_EXA_BVH)
 DEFINE_INT(AMRTEX_EXA_CELLS)
 DEFINE_INT(AMRTEX_EXA_BORDER)
-DEFINE_INT(AMRTEX_EXA_REGION_WORDS)
 DEFINE_INT(AMRTEX_EXA_MISSING)
 DEFINE_INT(AMRTEX_EXA_X_BITS)
 DEFINE_INT(AMRTEX_EXA_Y_BITS)
@@ -42,8 +38,13 @@ DEFINE_INT(AMRTEX_POOL_X)
 DEFINE_INT(AMRTEX_POOL_Y)
 DEFINE_INT(AMRTEX_POOL_Z)
 
-BUFFER(uint, exa_regions, exa_regions_block)
-BUFFER(uvec4, exa_bricks, exa_bricks_block)
+BUFFER(uvec4, exa_regions, exa_regions_block)  // two a region
+#if AMRTEX_CPP || AMRTEX_VALUE_RANGES
+BUFFER(uint, exa_ranges, exa_ranges_block)  // coded value range of a region
+#endif
+#if AMRTEX_CPP || AMRTEX_EXA_CELLS
+BUFFER(uvec4, exa_bricks, exa_bricks_block)  // two a brick
+#endif
 #if AMRTEX_CPP || (AMRTEX_FILTER == AMRTEX_FILTER_BASIS && !AMRTEX_EXA_CELLS)
 BUFFER(uvec4, exa_pieces, exa_pieces_block)
 #endif
@@ -55,12 +56,12 @@ BUFFER(uvec2, exa_nodes, exa_nodes_block)
 #endif
 #if AMRTEX_CPP || AMRTEX_EXA_GRID
 BUFFER(uint, exa_start, exa_start_block)               // a cell of the grid: where the boxes below tell its node
-BUFFER(uvec4, exa_start_nodes, exa_start_nodes_block)  // two a node: (lower corner, node), (upper corner, unused)
+BUFFER(uvec4, exa_start_nodes, exa_start_nodes_block)  // two a node: (lower corner, node), (upper corner, coded value range)
 UNIFORM(ivec3, u_exa_grid)                             // cells of the grid
 UNIFORM(ivec3, u_exa_grid_width)                       // x: width of a cell of the grid, finest cells
 #endif
 #if AMRTEX_CPP || AMRTEX_EXA_CELLS
-BUFFER(uvec4, exa_brick_nodes, exa_brick_nodes_block)  // (axis and first child, plane, widest cell below it, brick + 1 or 0)
+BUFFER(uvec4, exa_brick_nodes, exa_brick_nodes_block)  // two a node: (lower corner, brick + 1 or 0), (upper corner, node after those below)
 #endif
 #if AMRTEX_CPP || AMRTEX_EXA_MISSING
 BUFFER(uint, exa_validity, exa_validity_block)  // one bit a texel of the pool, each field from a new word
@@ -77,27 +78,18 @@ int exa_first_child(IN(uint) word) { return int(word & ((1u << uint(AMRTEX_EXA_C
 int exa_component(IN(ivec3) v, IN(int) axis) { return axis == 0 ? v.x : (axis == 1 ? v.y : v.z); }
 ivec3 exa_corner(IN(uvec4) words) { return ivec3(int(words.x), int(words.y), int(words.z)); }
 
-// Where the descent for a cell starts: a node, whose box r receives.
-int exa_begin(IN(ivec3) cell, INOUT(Region) r) {
 #if AMRTEX_CPP || AMRTEX_EXA_GRID
-  if (AMRTEX_EXA_GRID != 0) {
-    ivec3 g = divide_by_width(cell, u_exa_grid_width.x);
-    int start = int(exa_start[g.x + u_exa_grid.x * (g.y + u_exa_grid.y * g.z)]);
-    uvec4 lower = exa_start_nodes[start * 2];
-    r.lower = exa_corner(lower);
-    r.upper = exa_corner(exa_start_nodes[start * 2 + 1]);
-    return int(lower.w);
-  }
-#endif
-  r.lower = ivec3(0);
-  r.upper = u_domain_cells;
-  return 0;
+// The entry of the grid's cell about a cell.
+int exa_start_at(IN(ivec3) cell) {
+  ivec3 g = divide_by_width(cell, u_exa_grid_width.x);
+  return int(exa_start[g.x + u_exa_grid.x * (g.y + u_exa_grid.y * g.z)]);
 }
+#endif
 
 #if AMRTEX_CPP || !AMRTEX_EXA_BVH
-// The leaf that holds a cell: its region. r.lower and r.upper become its box.
-uint exa_descend(IN(ivec3) cell, INOUT(Region) r) {
-  uvec2 node = exa_nodes[exa_begin(cell, r)];
+// The leaf below a node that holds a cell: its region. r.lower and r.upper, the node's box, become the leaf's.
+uint exa_descend(IN(int) from, IN(ivec3) cell, INOUT(Region) r) {
+  uvec2 node = exa_nodes[from];
   int child = exa_first_child(node.x);
   int steps = 0;
   if (child != 0) {
@@ -139,16 +131,6 @@ uint exa_search_bvh(IN(ivec3) cell, INOUT(Region) r) {
 }
 #endif
 
-uint exa_find_region(IN(ivec3) cell, INOUT(Region) r) {
-#if AMRTEX_CPP
-  return AMRTEX_EXA_BVH != 0 ? exa_search_bvh(cell, r) : exa_descend(cell, r);
-#elif AMRTEX_EXA_BVH
-  return exa_search_bvh(cell, r);
-#else
-  return exa_descend(cell, r);
-#endif
-}
-
 ivec3 exa_unpack_size(IN(uint) size) {
   uint most = (1u << uint(AMRTEX_EXA_SIZE_BITS)) - 1u;
   return ivec3(int(size & most), int((size >> uint(AMRTEX_EXA_SIZE_BITS)) & most), int(size >> uint(2 * AMRTEX_EXA_SIZE_BITS)));
@@ -164,39 +146,79 @@ vec3r exa_inverse_pool() {
   return vec3r(real(1) / real(AMRTEX_POOL_X), real(1) / real(AMRTEX_POOL_Y), real(1) / real(AMRTEX_POOL_Z));
 }
 
-// Handle: (texel of the brick's first cell, its cells along the axes, first piece or the brick, pieces and flags or 0 in a plain region).
-// texture_lower and texture_scale turn q into cell widths from the brick's corner, or into its texture coordinate.
-bool locate(IN(Position) p, OUT(Region) r) {
-  uint region = exa_find_region(p.cell, r);
+// Found in three steps, of which a march takes no more than it needs: a box of the start grid and the range of all in it, ...
+#define AMRTEX_STAGED_LOCATE true
+int locate_group(IN(Position) p, INOUT(Region) r) {
+#if AMRTEX_CPP || AMRTEX_EXA_GRID
+  if (AMRTEX_EXA_GRID != 0) {
+    int start = exa_start_at(p.cell);
+    uvec4 lower = exa_start_nodes[start * 2];
+    uvec4 upper = exa_start_nodes[start * 2 + 1];
+    r.lower = exa_corner(lower);
+    r.upper = exa_corner(upper);
+    if (AMRTEX_VALUE_RANGES != 0) r.value_range = decode_range(upper.w);
+    return int(lower.w);
+  }
+#endif
+  r.lower = ivec3(0);
+  r.upper = u_domain_cells;
+  r.value_range = vec2r(as_real(0xff800000u), as_real(0x7f800000u));  // any value
+  return 0;
+}
+
+// ... the region's own box and range, ...
+bool locate_in_group(IN(Position) p, IN(int) group, INOUT(Region) r) {
+#if AMRTEX_CPP
+  uint region = AMRTEX_EXA_BVH != 0 ? exa_search_bvh(p.cell, r) : exa_descend(group, p.cell, r);
+#elif AMRTEX_EXA_BVH
+  uint region = exa_search_bvh(p.cell, r);
+#else
+  uint region = exa_descend(group, p.cell, r);
+#endif
+  r.handle = ivec4(int(region), 0, 0, 0);
   r.level = AMRTEX_LEVELS - 1;
   r.width = 1;
-  r.value_range = vec2r(0);
-  r.handle = ivec4(0);
-  r.brick = uvec4(0u);
-  r.texture_lower = vec3r(0);
-  r.texture_scale = vec3r(0);
   if (region == AMRTEX_EXA_NO_REGION) return false;
-  int at = int(region) * AMRTEX_EXA_REGION_WORDS;
-  int brick = int(exa_regions[at]);
-  uint about = exa_regions[at + 2];
-  uvec4 place = exa_bricks[brick * 2];
-  uvec4 store = exa_bricks[brick * 2 + 1];
-  r.level = int((about >> uint(AMRTEX_EXA_PIECE_BITS + 1)) & uint((1 << AMRTEX_EXA_LEVEL_BITS) - 1));
+#if AMRTEX_CPP || AMRTEX_VALUE_RANGES
+  if (AMRTEX_VALUE_RANGES != 0) r.value_range = decode_range(exa_ranges[int(region)]);
+#endif
+  return true;
+}
+
+// ... and what samples in it read. Handle: (texel of the brick's first cell, its cells along the axes, first piece or the brick, pieces and
+// flags or 0 in a plain region). texture_lower and texture_scale turn q into cell widths from the brick's corner, or into its texture coordinate.
+void open_region(INOUT(Region) r) {
+  int region = r.handle.x;
+  uvec4 store = exa_regions[region * 2];
+  uvec4 place = exa_regions[region * 2 + 1];
+  int levels = (1 << AMRTEX_EXA_LEVEL_BITS) - 1;
+  r.level = int(store.w >> uint(AMRTEX_EXA_PIECE_BITS + AMRTEX_EXA_LEVEL_BITS + 1)) & levels;
   r.width = level_width(r.level);
-  if (AMRTEX_VALUE_RANGES != 0) r.value_range = decode_range(exa_regions[at + 3]);
-  r.brick.w = place.w;
-  r.handle.x = int(store.z);
-  r.handle.y = int(store.w);
-  r.handle.z = AMRTEX_EXA_CELLS != 0 ? brick : int(exa_regions[at + 1]);
+  r.brick = uvec4(0u, 0u, 0u, uint(int(store.w >> uint(AMRTEX_EXA_PIECE_BITS)) & levels));
   uint flags = AMRTEX_EXA_OWN_FLAG | AMRTEX_EXA_MISSING_FLAG | ((1u << uint(AMRTEX_EXA_PIECE_BITS)) - 1u);
-  r.handle.w = (about & AMRTEX_EXA_PLAIN_FLAG) != 0u ? 0 : int(about & flags);
-  real inverse_width = real(1) / real(level_width(int(place.w)));
+  r.handle = ivec4(int(store.x), int(store.y), AMRTEX_EXA_CELLS != 0 ? int(place.w) : int(store.z),
+                   (store.w & AMRTEX_EXA_PLAIN_FLAG) != 0u ? 0 : int(store.w & flags));
+  real inverse_width = real(1) / real(level_width(AMRTEX_LEAF_LEVEL(r)));
   r.texture_lower = vec3r(r.lower - exa_corner(place)) * inverse_width;
   r.texture_scale = vec3r(real(r.width) * inverse_width);
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
-  r.texture_lower = (vec3r(exa_unpack_texel(store.z)) + r.texture_lower) * exa_inverse_pool();
+  r.texture_lower = (vec3r(exa_unpack_texel(store.x)) + r.texture_lower) * exa_inverse_pool();
   r.texture_scale *= exa_inverse_pool();
 #endif
+}
+
+bool locate(IN(Position) p, OUT(Region) r) {
+  r.value_range = vec2r(0);
+  int group = locate_group(p, r);
+  r.value_range = vec2r(0);
+  r.brick = uvec4(0u);
+  r.texture_lower = vec3r(0);
+  r.texture_scale = vec3r(0);
+  if (!locate_in_group(p, group, r)) {
+    r.handle = ivec4(0);
+    return false;
+  }
+  open_region(r);
   return true;
 }
 
@@ -373,33 +395,29 @@ void exa_add_piece(IN(Region) r, IN(ExaPiece) p, IN(int) field, IN(vec3r) q, INO
 }
 
 #if AMRTEX_CPP || AMRTEX_EXA_CELLS
-// The hats about q after a search from the root, as each sample of Wald et al. 2017 makes it: into both sides of a plane
-// that lies within half of the widest cell there.
+// The next brick whose cells' hats may reach q, from node i of the bricks' tree on: boxes of supports, depth first; what does not hold q is
+// passed over. -1: there is none. i becomes the node after it, 0 at the end.
+int exa_next_brick(IN(Region) r, IN(vec3r) q, INOUT(int) i) {
+  vec3r place = q * real(r.width);
+  int brick = -1;
+  do {
+    uvec4 lower = exa_brick_nodes[i * 2];
+    uvec4 upper = exa_brick_nodes[i * 2 + 1];
+    bool holds = all(greaterThan(place, vec3r(exa_corner(lower) - r.lower))) && all(lessThan(place, vec3r(exa_corner(upper) - r.lower)));
+    if (holds) brick = int(lower.w) - 1;
+    i = holds && lower.w == 0u ? i + 1 : int(upper.w);
+  } while (i != 0 && brick < 0);
+  return brick;
+}
+
+// The hats about q after a search from the root, as each sample of Wald et al. 2017 makes it.
 vec2r exa_search_cells(IN(Region) r, IN(int) field, IN(vec3r) q) {
   vec2r sums = vec2r(0);
-  int stack[AMRTEX_EXA_STACK];
-  int top = 1;
-  stack[0] = 0;
+  int i = 0;
   do {
-    top -= 1;
-    uvec4 node = exa_brick_nodes[stack[top]];
-    int child = exa_first_child(node.x);
-    if (child != 0) {
-      int axis = exa_axis(node.x);
-      real from_plane = q[axis] * real(r.width) + real(exa_component(r.lower, axis) - int(node.y));
-      // of the two children: how far the hats of their cells reach past the plane
-      if (from_plane > real(-0.5) * real(int(exa_brick_nodes[child + 1].z))) {
-        stack[top] = child + 1;
-        top += 1;
-      }
-      if (from_plane < real(0.5) * real(int(exa_brick_nodes[child].z))) {
-        stack[top] = child;
-        top += 1;
-      }
-    } else if (node.w != 0u) {
-      exa_add_piece(r, exa_brick(r, int(node.w) - 1), field, q, sums);
-    }
-  } while (top > 0);
+    int brick = exa_next_brick(r, q, i);
+    if (brick >= 0) exa_add_piece(r, exa_brick(r, brick), field, q, sums);
+  } while (i != 0);
   return sums;
 }
 #endif
@@ -470,6 +488,92 @@ real exa_basis_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
   }
   return value;
 #endif
+}
+#endif
+
+#if AMRTEX_CPP || AMRTEX_FILTER == AMRTEX_FILTER_BASIS
+// ---- gradient of basis: of a quotient of two sums, hat by hat (Wald et al. 2020, section 5.1.2)
+#define AMRTEX_FETCH_GRADIENT 1
+#define AMRTEX_STORED_GRADIENTS false
+
+STRUCT ExaSlopes {
+  vec4r values;  // sum of hats times values: its derivatives by q, and itself
+  vec4r hats;    // the same of the hats
+};
+
+// Adds the eight hats about x of the texels of `p`, and of `beyond` more around them; `check`: those of cells without value are left out.
+void exa_add_slopes(IN(ExaPiece) p, IN(int) beyond, IN(bool) check, IN(vec3r) x, INOUT(ExaSlopes) slopes) {
+  PRECISE vec3r from_centre = x - vec3r(0.5);
+  vec3r whole = floor(from_centre);
+  PRECISE vec3r f = from_centre - whole;
+  int k = 0;
+  do {
+    ivec3 corner = ivec3(k & 1, (k >> 1) & 1, k >> 2);
+    ivec3 c = ivec3(whole) + corner;
+    bool there = all(greaterThanEqual(c, ivec3(-beyond))) && all(lessThan(c, p.cells + ivec3(beyond)));
+#if AMRTEX_CPP || AMRTEX_EXA_MISSING
+    if (there && check) there = exa_has_value(0, p.texel + c);
+#endif
+    if (there) {
+      vec3r w = vec3r(corner) * f + vec3r(ivec3(1) - corner) * (vec3r(1) - f);
+      vec3r slope = vec3r(corner * 2 - ivec3(1)) * p.scale;
+      vec4r hat = vec4r(slope.x * w.y * w.z, w.x * slope.y * w.z, w.x * w.y * slope.z, w.x * w.y * w.z);
+      slopes.values += hat * decode_value(exa_texel(0, p.texel + c), 0);
+      slopes.hats += hat;
+    }
+    k += 1;
+  } while (k < 8);
+}
+
+#if AMRTEX_CPP || !AMRTEX_EXA_CELLS
+// Of a plain region: its brick's texels as they stand.
+void exa_add_plain_slopes(IN(Region) r, IN(vec3r) q, INOUT(ExaSlopes) slopes) {
+  ExaPiece own;
+  own.from_corner = vec3r(0);
+  own.scale = real(r.width) * (real(1) / real(level_width(AMRTEX_LEAF_LEVEL(r))));
+  own.texel = exa_unpack_texel(uint(r.handle.x));
+  own.cells = exa_unpack_size(uint(r.handle.y));
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+  vec3r x = (r.texture_lower + q * r.texture_scale) / exa_inverse_pool() - vec3r(own.texel);
+#else
+  vec3r x = q * r.texture_scale + r.texture_lower;
+#endif
+  exa_add_slopes(own, AMRTEX_EXA_BORDER, false, x, slopes);
+}
+#endif
+
+vec3r fetch_gradient(IN(Region) r, IN(vec3r) q) {
+  ExaSlopes slopes;
+  slopes.values = vec4r(0);
+  slopes.hats = vec4r(0);
+  bool check = AMRTEX_EXA_MISSING != 0 && exa_flag(r, AMRTEX_EXA_MISSING_FLAG);
+#if AMRTEX_CPP || AMRTEX_EXA_CELLS
+  if (AMRTEX_EXA_CELLS != 0) {
+    int node = 0;
+    do {
+      int brick = exa_next_brick(r, q, node);
+      if (brick >= 0) {
+        ExaPiece found = exa_brick(r, brick);
+        exa_add_slopes(found, 0, check, exa_piece_position(found, q), slopes);
+      }
+    } while (node != 0);
+  }
+#endif
+#if AMRTEX_CPP || !AMRTEX_EXA_CELLS
+  int i = r.handle.z;
+  int end = i + (r.handle.w & ((1 << AMRTEX_EXA_PIECE_BITS) - 1));
+  if (AMRTEX_EXA_CELLS == 0 && r.handle.w == 0) exa_add_plain_slopes(r, q, slopes);
+  if (AMRTEX_EXA_CELLS == 0 && i < end) {
+    do {
+      ExaPiece piece = exa_piece(r, i);
+      exa_add_slopes(piece, 0, check, exa_piece_position(piece, q), slopes);
+      i += 1;
+    } while (i < end);
+  }
+#endif
+  real inverse = real(1) / slopes.hats.w;
+  real value = slopes.values.w * inverse;
+  return (vec3r(slopes.values.x, slopes.values.y, slopes.values.z) - vec3r(slopes.hats.x, slopes.hats.y, slopes.hats.z) * value) * inverse;
 }
 #endif
 

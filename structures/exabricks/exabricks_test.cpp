@@ -6,7 +6,9 @@
 
 #include <set>
 
+#include "renderers/hierarchy_reference.hpp"
 #include "renderers/raycaster.hpp"
+#include "renderers/reference_point.hpp"
 #include "structures/exabricks/bricks.hpp"
 #include "structures/exabricks/bvh.hpp"
 #include "structures/exabricks/regions.hpp"
@@ -278,6 +280,148 @@ TEST(Exabricks, ThePictureDoesNotDependOnBricksOrSkipping) {
     const Picture all = draw_field(parameters, false);
     EXPECT_EQ(draw_field(parameters, true).values, all.values) << "skipping changes no bit";
     EXPECT_LE(difference(all, expected), 1e-6);
+  }
+}
+
+TEST(Exabricks, ASampleTellsTheLevelOfItsLeafWhereverFinerHatsReach) {
+  const AmrHierarchy h = jump_of_two(waves).hierarchy();
+  const auto positions = probe_positions(h, 40);
+  for (const Json& parameters : parameter_sets()) {
+    SCOPED_TRACE(parameters.dump());
+    const auto found = probe_on_cpu(h, exa_field(h, Filter::basis, parameters), Precision::single_precision, positions);
+    for (std::size_t i = 0; i < positions.size(); ++i)
+      if (const auto leaf = h.find_leaf(positions[i].cell)) {
+        EXPECT_EQ(found[i].level, leaf->level);
+      }
+  }
+}
+
+// ---- gradients
+
+Scene normals_of(double isovalue, Shading shading, const Vec3d& middle, int pixels) {
+  Scene scene;
+  scene.view = orthographic(middle, {0.3, 0.2, -1}, 0.9);
+  scene.settings.mode = Mode::iso;
+  scene.settings.step = 0.25;
+  scene.settings.width = scene.settings.height = pixels;
+  scene.settings.isosurfaces.values = {isovalue};
+  scene.settings.isosurfaces.tolerance = 1e-5;
+  scene.settings.isosurfaces.shading = shading;
+  scene.settings.isosurfaces.output = Output::normal;
+  return scene;
+}
+
+TEST(ExabricksGradients, OfTheReferenceAreTheLimitsOfDifferences) {
+  // f is a quotient of trilinear functions between the planes of cell centres and faces: (f(p + e) - f(p - e)) / 2e = f'(p) +
+  // O(e^2)
+  const double e = 1e-5;
+  for (const NamedMesh& mesh : conformance_meshes()) {
+    SCOPED_TRACE(mesh.name);
+    const AmrHierarchy& h = mesh.hierarchy;
+    const Vec3d cell = h.spacing(h.finest_level());
+    for (const Filter filter : {Filter::basis, Filter::linear_lod, Filter::linear_vertex}) {
+      const ReferenceField field(h, 0, {filter});
+      const auto f = [&](const Vec3d& p) {
+        const auto at = position_at(h, p);
+        return at ? value_at(field, *at, nullptr) : std::nullopt;
+      };
+      for (const FinestPosition& at : probe_positions(h, 20)) {
+        // a quarter and an eighth of a finest cell: no centre and no face of any level
+        const Vec3d p = Vec3d(at.cell) + Vec3d(0.25, 0.375, 0.125);
+        const auto derivative = derivative_at(field, p, nullptr);
+        for (int a = 0; derivative && a < 3; ++a) {
+          Vec3d step(0);
+          step[a] = e;
+          const auto below = f(p - step), above = f(p + step);
+          if (!below || !above) continue;
+          EXPECT_NEAR((*derivative)[a] * cell[a], (*above - *below) / (2 * e), 1e-6 * value_range(h)) << filter_name(filter);
+        }
+      }
+    }
+  }
+}
+
+TEST(ExabricksGradients, AreTheReferencesNormals) {
+  for (const NamedMesh& mesh : conformance_meshes()) {
+    if (mesh.name == "one cell") continue;
+    SCOPED_TRACE(mesh.name);
+    const AmrHierarchy& h = mesh.hierarchy;
+    const Scene scene = normals_of(0.55, Shading::analytic, (h.domain_lower() + h.domain_upper()) * 0.5, 24);
+    for (const Json& parameters : {Json::object(), Json{{"border", 0}}, Json{{"locate", "cells"}}}) {
+      SCOPED_TRACE(parameters.dump());
+      BuildRequest request;
+      request.storage = Storage::r64f;
+      request.needs = scene_needs(scene, Filter::basis, Filtering::manual);
+      request.parameters = parameters;
+      const EncodedField field = find_encoding("exabricks").build(h, request);
+      const Picture expected = HierarchyReference(h, 0, field.definition).render(scene, 0.0625);
+      const Picture drawn = render_on_cpu(h, field, scene, true);
+      int compared = 0, off = 0;
+      for (int y = 0; y < 24; ++y)
+        for (int x = 0; x < 24; ++x) {
+          const double *a = expected.pixel(x, y), *b = drawn.pixel(x, y);
+          if (a[3] == 0 && b[3] == 0) continue;
+          ++compared;
+          off += glm::distance(Vec3d(a[0], a[1], a[2]), Vec3d(b[0], b[1], b[2])) > 1e-3 ? 1 : 0;
+        }
+      EXPECT_GT(compared, 20);
+      // silhouettes, and hits that lie by rounding on one side of a plane through cell centres, where the derivative jumps
+      EXPECT_LE(off, 0.025 * compared);
+      << "the derivative jumps where a ray's hit lies by rounding on one side of a cell's centre";
+    }
+  }
+}
+
+TEST(ExabricksGradients, OfASphereConvergeInEveryKind) {
+  const Vec3d middle(0.5);
+  const auto distance = [&](const Vec3d& p) { return glm::distance(p, middle); };
+  for (const Shading shading : {Shading::analytic, Shading::central, Shading::clamped}) {
+    std::vector<double> errors;
+    for (const int n : {16, 32, 64}) {
+      // two levels that meet across the sphere
+      const AmrHierarchy h =
+          MeshBuilder(Vec3i(n), {2}).root(distance).patch(1, {{0, 0, 0}, {n, 2 * n, 2 * n}}, distance).hierarchy();
+      const Scene scene = normals_of(0.3, shading, middle, 32);
+      BuildRequest request;
+      request.needs = scene_needs(scene, Filter::basis, Filtering::hardware);
+      const EncodedField field = find_encoding("exabricks").build(h, request);
+      const Picture picture = draw(context(ContextKind::egl), h, field, scene);
+      double sum = 0;
+      int count = 0;
+      for (int y = 0; y < 32; ++y)
+        for (int x = 0; x < 32; ++x) {
+          const WorldRay ray = camera_ray(camera_frame(scene.view, 32, 32), x, y, 32, 32);
+          const double b = glm::dot(ray.origin - middle, ray.direction);
+          const double discriminant = b * b - glm::dot(ray.origin - middle, ray.origin - middle) + 0.09;
+          if (discriminant < 0.01) continue;
+          const Vec3d exact = (ray.origin + (-b - std::sqrt(discriminant)) * ray.direction - middle) / 0.3;
+          const double* p = picture.pixel(x, y);
+          sum += std::pow(glm::distance(Vec3d(p[0], p[1], p[2]), exact), 2);
+          ++count;
+        }
+      errors.push_back(std::sqrt(sum / count));
+    }
+    SCOPED_TRACE(fmt::format("{}: {:.2e} {:.2e} {:.2e}", shading_name(shading), errors[0], errors[1], errors[2]));
+    RecordProperty(std::string(shading_name(shading)), fmt::format("{:.3e}", errors[2]));
+    EXPECT_LT(errors[2], 0.05);
+    EXPECT_GE(std::log2(errors[0] / errors[2]) / 2, 0.45)
+        << "a share of the pixels lies where levels meet, and the kinks of f stay there";
+  }
+}
+
+TEST(ExabricksGradients, AreRefusedWhereAnEncodingHasNone) {
+  const AmrHierarchy h = nested(waves).hierarchy();
+  BuildRequest request;
+  request.needs.filter = Filter::nearest;
+  request.needs.analytic_gradients = true;
+  for (const char* name : {"exabricks", "uniform"}) {
+    try {
+      find_encoding(name).build(h, request);
+      ADD_FAILURE() << name;
+    } catch (const UnsupportedError& error) {
+      EXPECT_THAT(error.what(),
+                  AllOf(HasSubstr(name), HasSubstr("no analytic gradient of nearest"), HasSubstr("exabricks with basis")));
+    }
   }
 }
 
