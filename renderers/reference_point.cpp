@@ -31,6 +31,42 @@ double vertex(const ReferenceField& field, const ReferenceLeaf& leaf, const Fine
   return Trilinear::through(field.leaf_vertices(leaf, vertices))(place_in_cell(p, field.width(leaf.level)));
 }
 
+/// A function that is linear along each axis, and its derivatives per finest cell.
+struct Slope {
+  double value = 0;
+  Vec3d derivative{0};
+  void add(const Trilinear& f, const Vec3d& q, int width) {
+    value += f(q);
+    for (int a = 0; a < 3; ++a) {
+      Vec3d low = q, high = q;
+      low[a] = 0;
+      high[a] = 1;
+      derivative[a] += (f(high) - f(low)) / width;
+    }
+  }
+};
+
+Slope basis_slope(const ReferenceField& field, const FinestPosition& p) {
+  Slope numerator, denominator;
+  for (int level = 0; level < field.hierarchy().level_count(); ++level) {
+    const int width = field.width(level);
+    const DualPlace place = dual_place(p, width);
+    const auto cell = field.basis_cell(level, place.lower);
+    numerator.add(Trilinear::through(cell.values), place.q, width);
+    denominator.add(Trilinear::through(cell.weights), place.q, width);
+    if (!cell.finer) break;
+  }
+  const double f = numerator.value / denominator.value;
+  return {f, (numerator.derivative - f * denominator.derivative) / denominator.value};
+}
+
+Slope linear_slope(const ReferenceField& field, int level, const FinestPosition& p) {
+  const DualPlace place = dual_place(p, field.width(level));
+  Slope slope;
+  slope.add(Trilinear::through(field.dual_cell(level, place.lower).values), place.q, field.width(level));
+  return slope;
+}
+
 double basis(const ReferenceField& field, const FinestPosition& p) {
   double numerator = 0;
   double denominator = 0;
@@ -114,6 +150,24 @@ std::optional<Vec3d> gradient_at(const ReferenceField& field, const Vec3d& p, Ve
     if (sides > 0) gradient[a] = (above.value_or(*here) - below.value_or(*here)) / (sides * difference.world[a]);
   }
   return gradient;
+}
+
+std::optional<Vec3d> derivative_at(const ReferenceField& field, const Vec3d& p, VertexCache* vertices) {
+  const Filter filter = field.definition().filter;
+  if (filter == Filter::nearest) return gradient_at(field, p, vertices);
+  const auto position = position_at(field.hierarchy(), p);
+  if (!position || !value_at(field, *position, vertices)) return std::nullopt;
+  const ReferenceLeaf leaf = field.find_leaf(position->cell);
+  Slope slope;
+  if (filter == Filter::basis)
+    slope = basis_slope(field, *position);
+  else if (filter == Filter::linear_vertex)
+    slope.add(Trilinear::through(field.leaf_vertices(leaf, vertices)), place_in_cell(*position, field.width(leaf.level)),
+              field.width(leaf.level));
+  else
+    slope = linear_slope(field, filter == Filter::linear_lod ? leaf.level : field.page_level(position->cell), *position);
+  const AmrHierarchy& h = field.hierarchy();
+  return slope.derivative / h.spacing(h.finest_level());
 }
 
 }  // namespace amrtex

@@ -20,4 +20,7 @@ std::optional<double> value_at(const ReferenceField& field, const FinestPosition
 /// the world's axes; nullopt where p has no value. p in finest space.
 std::optional<Vec3d> gradient_at(const ReferenceField& field, const Vec3d& p, VertexCache* vertices);
 
+/// The derivative of f, in the same units. Of `nearest` and of what has none, gradient_at().
+std::optional<Vec3d> derivative_at(const ReferenceField& field, const Vec3d& p, VertexCache* vertices);
+
 }  // namespace amrtex

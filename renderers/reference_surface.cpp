@@ -141,6 +141,10 @@ Vec3d SurfacePainter::color_at(const Vec3d& p, std::size_t surface, const Vec3d&
   return normal == Vec3d(0) ? rgb : rgb * surface_light(glm::dot(normal, direction));
 }
 
-Vec3d SurfacePainter::normal_at(const Vec3d& p) { return unit(gradient_at(scene_.field, p, &vertices_).value_or(Vec3d(0))); }
+Vec3d SurfacePainter::normal_at(const Vec3d& p) {
+  const auto gradient =
+      scene_.settings.shading == Shading::analytic ? derivative_at(scene_.field, p, &vertices_) : gradient_at(scene_.field, p, &vertices_);
+  return unit(gradient.value_or(Vec3d(0)));
+}
 
 }  // namespace amrtex

@@ -4,13 +4,20 @@
 #define fetch_value encoding_value
 #define fetch_stencil encoding_stencil
 #define fetch_gradient encoding_gradient
+#define locate_group encoding_group
+#define locate_in_group encoding_in_group
+#define open_region encoding_open
 #include AMRTEX_SAMPLED_FILE
 #undef locate
 #undef fetch_value
 #undef fetch_stencil
 #undef fetch_gradient
+#undef locate_group
+#undef locate_in_group
+#undef open_region
 // every sample is fetched, and any may be without a value; gradients are differences of the values
 #undef AMRTEX_CELL_REGIONS
+#undef AMRTEX_STAGED_LOCATE
 #undef AMRTEX_FETCH_GRADIENT
 #undef AMRTEX_STORED_GRADIENTS
 #define AMRTEX_VALIDITY 1

@@ -195,7 +195,10 @@ std::string_view output_name(Output output) {
   return "";
 }
 
-std::string_view shading_name(Shading shading) { return shading == Shading::none ? "none" : "gradient"; }
+std::string_view shading_name(Shading shading) {
+  constexpr std::array<std::string_view, 5> kNames{"none", "gradient", "central", "clamped", "analytic"};
+  return kNames[static_cast<std::size_t>(shading)];
+}
 
 int RenderSettings::picture_channels() const {
   if (draws_surfaces()) return isosurfaces.output == Output::depth ? 1 : 4;
@@ -298,9 +301,9 @@ Output parse_output(std::string_view name) {
 }
 
 Shading parse_shading(std::string_view name) {
-  for (const Shading shading : {Shading::none, Shading::gradient})
+  for (const Shading shading : {Shading::none, Shading::gradient, Shading::central, Shading::clamped, Shading::analytic})
     if (name == shading_name(shading)) return shading;
-  throw UsageError(fmt::format("unknown shading '{}'; accepted are none, gradient", name));
+  throw UsageError(fmt::format("unknown shading '{}'; accepted are none, gradient, central, clamped, analytic", name));
 }
 
 void validate(const Isosurfaces& iso) {

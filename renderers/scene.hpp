@@ -83,8 +83,9 @@ enum class Integrator { exponential_midpoint, euler, left, preintegrated, tolera
 /// What a picture of isosurfaces holds: colour; world distance from the ray's origin to the first surface,
 /// 0 where there is none; or the unit normal there (the gradient's direction), alpha 1, else all 0.
 enum class Output { color, depth, normal };
-/// Light on isosurfaces: none, or a lamp at the eye that lights both sides.
-enum class Shading { none, gradient };
+/// Light on isosurfaces: none, or a lamp at the eye that lights both sides. Its gradient: the encoding's stored one, else central
+/// differences; central differences; the same inside of the region that holds the hit; the derivative of f.
+enum class Shading { none, gradient, central, clamped, analytic };
 std::string_view mode_name(Mode mode);
 std::string_view sampling_name(Sampling sampling);
 std::string_view consumer_name(ConsumerKind consumer);

@@ -219,7 +219,7 @@ void add_surfaces(const Scene& scene, const EncodedField& field, SceneBindings& 
   b.defines.emplace_back("AMRTEX_SURFACE_POINTS", mapped ? static_cast<int>(map.color.size()) : 0);
   b.defines.emplace_back("AMRTEX_SURFACE_LOGARITHMIC", mapped && map.logarithmic ? 1 : 0);
   b.defines.emplace_back("AMRTEX_OUTPUT", static_cast<int>(iso.output));
-  b.defines.emplace_back("AMRTEX_SHADING", iso.shading == Shading::gradient ? 1 : 0);
+  b.defines.emplace_back("AMRTEX_SHADING", static_cast<int>(iso.shading));
 }
 
 /// Beyond this distance, in diagonals of the domain, a lamp is moved nearer along its own direction: what changes
@@ -461,7 +461,9 @@ SceneNeeds scene_needs(const Scene& scene, Filter filter, Filtering filtering) {
   needs.draw_boxes = scene.settings.consumer != ConsumerKind::raycast;
   needs.everything = scene.settings.everything;
   needs.value_ranges = scene.settings.skip || needs.everything;
-  const bool lit = scene.settings.draws_surfaces() && scene.settings.isosurfaces.shading == Shading::gradient;
+  const Shading shading = scene.settings.draws_surfaces() ? scene.settings.isosurfaces.shading : Shading::none;
+  const bool lit = shading == Shading::gradient;
+  needs.analytic_gradients = shading == Shading::analytic;
   needs.gradients = lit || needs.everything;
   if (!scene.settings.prune) return needs;
   validate_prune(scene.settings);

@@ -170,6 +170,15 @@ bool level_suffices(IN(ivec3) lower, IN(ivec3) upper, IN(int) level, IN(int) nex
 
 #include AMRTEX_ENCODING_FILE
 
+// Optional: `locate` in steps, for a march that skips: the box and value range of a group of regions about p, which a march passes as one where
+// none can be seen; the region's own box and value range; and what samples in it need.
+#ifndef AMRTEX_STAGED_LOCATE
+#define AMRTEX_STAGED_LOCATE false
+int locate_group(IN(Position) p, INOUT(Region) r) { return 0; }
+bool locate_in_group(IN(Position) p, IN(int) group, INOUT(Region) r) { return locate(p, r); }
+void open_region(INOUT(Region) r) {}
+#endif
+
 // The drawn field: number 0, of which ranges, constants and skipping speak.
 real fetch_field(IN(Region) r, IN(vec3r) q) { return fetch_value(r, 0, q); }
 
@@ -184,8 +193,13 @@ void fetch_stencil(IN(Region) r, IN(ivec3) octant, OUT(Stencil) s) {
 }
 #endif
 
-// Optional: `vec3r fetch_gradient(Region r, vec3r q)`, the stored gradient of f per cell width of r along each axis,
-// and AMRTEX_STORED_GRADIENTS: were any stored?
+// Optional: level of the leaf cell that holds a position of the region, where that is not the region's own.
+#ifndef AMRTEX_LEAF_LEVEL
+#define AMRTEX_LEAF_LEVEL(r) (r).level
+#endif
+
+// Optional: `vec3r fetch_gradient(Region r, vec3r q)`, the gradient of f per cell width of r along each axis, and
+// AMRTEX_STORED_GRADIENTS: are they stored, and any there? Else they are the derivative of f (Encoding::analytic_gradients).
 #ifndef AMRTEX_FETCH_GRADIENT
 #define AMRTEX_FETCH_GRADIENT 0
 #define AMRTEX_STORED_GRADIENTS false
@@ -205,6 +219,11 @@ vec3r region_position(IN(Region) r, IN(Position) p) {
   return q;
 }
 
+// q inside a region: at most so far from its lower corner that rounding does not carry it through a face.
+vec3r inside_region(IN(Region) r, IN(vec3r) q) {
+  return clamp(q, vec3r(0), vec3r(r.upper - r.lower) / real(r.width) * AMRTEX_BELOW_ONE);
+}
+
 // Field number `field` (a constant at every call) at a position; false where it has no value.
 bool sample_value(IN(Position) p, IN(int) field, OUT(FieldSample) s) {
   Region r;
@@ -213,7 +232,7 @@ bool sample_value(IN(Position) p, IN(int) field, OUT(FieldSample) s) {
   if (any(lessThan(p.cell, ivec3(0))) || any(greaterThanEqual(p.cell, u_domain_cells))) return false;
   if (!locate(p, r)) return false;
   s.value = fetch_value(r, field, region_position(r, p));
-  s.level = r.level;
+  s.level = AMRTEX_LEAF_LEVEL(r);
   if (AMRTEX_VALIDITY != 0 && is_no_value(s.value)) return false;
   return true;
 }

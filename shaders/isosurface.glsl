@@ -10,7 +10,7 @@
 #error AMRTEX_OUTPUT must be defined: one of the AMRTEX_OUTPUT_... below
 #endif
 #ifndef AMRTEX_SHADING
-#error AMRTEX_SHADING must be defined: 1 where surfaces are lit by their gradient, else 0
+#error AMRTEX_SHADING must be defined: one of the AMRTEX_SHADING_... below
 #endif
 #ifndef AMRTEX_SURFACE_POINTS
 #error AMRTEX_SURFACE_POINTS must be defined: how many points the colours over field 1 have; 0: each isovalue has its colour
@@ -30,6 +30,13 @@ DEFINE_INT(AMRTEX_SURFACE_LOGARITHMIC)
 #define AMRTEX_OUTPUT_COLOR 0
 #define AMRTEX_OUTPUT_DEPTH 1
 #define AMRTEX_OUTPUT_NORMAL 2
+
+// the same numbers as enum class Shading (renderers/scene.hpp)
+#define AMRTEX_SHADING_NONE 0
+#define AMRTEX_SHADING_GRADIENT 1
+#define AMRTEX_SHADING_CENTRAL 2
+#define AMRTEX_SHADING_CLAMPED 3
+#define AMRTEX_SHADING_ANALYTIC 4
 
 #if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
 UNIFORM_ARRAY(real, u_isovalues, AMRTEX_ISOVALUES, 16)           // ascending
@@ -144,23 +151,64 @@ vec3r surface_gradient(IN(Position) p, IN(real) isovalue) {
 }
 
 #if AMRTEX_FETCH_GRADIENT
-// The gradient that the encoding stores.
-vec3r stored_gradient(IN(Position) p) {
+// The gradient that the encoding stores, or computes.
+#define AMRTEX_ENCODINGS_GRADIENT \
+  (AMRTEX_STORED_GRADIENTS ? AMRTEX_SHADING <= AMRTEX_SHADING_GRADIENT : AMRTEX_SHADING == AMRTEX_SHADING_ANALYTIC)
+vec3r encodings_gradient(IN(Position) p) {
   Region r;
   if (!locate(p, r)) return vec3r(0);
   return fetch_gradient(r, region_position(r, p)) * vec3r(u_cells_per_unit) / real(r.width);
 }
 #endif
 
+#if AMRTEX_CPP || AMRTEX_SHADING == AMRTEX_SHADING_CLAMPED
+// Central differences between places of the region that holds p, a leaf cell's width from it at most (Wald et al. 2020, section
+// 5.1.2): the region is found once.
+vec3r clamped_gradient(IN(Position) p) {
+  Region r;
+  if (!locate(p, r)) return vec3r(0);
+  vec3r q = region_position(r, p);
+  real width = real(level_width(AMRTEX_LEAF_LEVEL(r))) / real(r.width);
+  vec3r gradient = vec3r(0);
+  vec3r low = vec3r(0);
+  real at = real(0);
+  for (int i = 0; i < 6; ++i) {  // the lower and the upper side along each axis
+    int axis = i >> 1;
+    vec3r beside = q;
+    beside[axis] += (i & 1) == 0 ? -width : width;
+    beside = inside_region(r, beside);
+    real value = fetch_field(r, beside);
+    bool there = !is_no_value(value);
+    if (!there) {
+      beside = q;
+      value = fetch_field(r, q);
+    }
+    if ((i & 1) == 0) {
+      low[axis] = value;
+      at = beside[axis];
+    } else if (beside[axis] > at) {
+      gradient[axis] = (value - low[axis]) / (beside[axis] - at);
+    }
+  }
+  return gradient * vec3r(u_cells_per_unit) / real(r.width);
+}
+#endif
+
 // Unit normal, along the gradient; 0 where there is no gradient.
 vec3r surface_normal(IN(Position) p, IN(real) isovalue) {
   vec3r gradient = vec3r(0);
+  bool found = false;
 #if AMRTEX_FETCH_GRADIENT
-  if (AMRTEX_STORED_GRADIENTS) gradient = stored_gradient(p);
-  else gradient = surface_gradient(p, isovalue);
-#else
-  gradient = surface_gradient(p, isovalue);
+  found = AMRTEX_ENCODINGS_GRADIENT;
+  if (AMRTEX_ENCODINGS_GRADIENT) gradient = encodings_gradient(p);
 #endif
+#if AMRTEX_CPP || AMRTEX_SHADING == AMRTEX_SHADING_CLAMPED
+  if (AMRTEX_SHADING == AMRTEX_SHADING_CLAMPED && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST) {
+    gradient = clamped_gradient(p);
+    found = true;
+  }
+#endif
+  if (!found) gradient = surface_gradient(p, isovalue);
   // fields of any magnitude: the square of a gradient may be no float
   real largest = max(abs(gradient.x), max(abs(gradient.y), abs(gradient.z)));
   if (!(largest > real(0)) || largest > real(3e38)) return vec3r(0);

@@ -19,11 +19,6 @@ DEFINE_INT(AMRTEX_EARLY_END)
 DEFINE_INT(AMRTEX_COUNT)
 DEFINE_INT(AMRTEX_RAY_DOUBLE)
 
-// q inside a region: at most so far from its lower corner that rounding does not carry it through a face.
-vec3r inside_region(IN(Region) r, IN(vec3r) q) {
-  return clamp(q, vec3r(0), vec3r(r.upper - r.lower) / real(r.width) * AMRTEX_BELOW_ONE);
-}
-
 #if AMRTEX_CPP || AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE
 #include "tolerance.glsl"
 #endif
@@ -46,6 +41,15 @@ bool region_invisible(IN(Accumulation) a, IN(Region) r) {
   if (AMRTEX_MODE == AMRTEX_MODE_ISO) return true;
   if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION) return r.value_range.x == real(0) && r.value_range.y == real(0);
   return r.value_range.y <= a.maximum;
+}
+
+// locate(), but only as far as skipping needs: r may be a group of regions that cannot be seen, and needs open_region() before
+// it is sampled. Pre-integration samples what it skips: there every region is its own.
+#define AMRTEX_SKIPS_IN_STAGES (AMRTEX_STAGED_LOCATE && AMRTEX_SKIP != 0 && AMRTEX_VALUE_RANGES != 0 && !AMRTEX_PREINTEGRATED)
+bool march_locate(IN(Accumulation) a, IN(Position) p, OUT(Region) r) {
+  if (!AMRTEX_SKIPS_IN_STAGES) return locate(p, r);
+  int group = locate_group(p, r);
+  return region_invisible(a, r) || locate_in_group(p, group, r);
 }
 
 // The sample at `at`, whose interval begins at `begin` (units of ray length; only isosurfaces use them).
@@ -338,7 +342,7 @@ int march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) f
       bool skipped = true;
       do {  // the next region that can be seen: all lanes of a SIMD group then sample together
         first = i;
-        bool inside = locate(lattice_position(block, real(i)), r);
+        bool inside = march_locate(a, lattice_position(block, real(i)), r);
         skipped = !inside || region_invisible(a, r);
         if (skipped || !stencils) i = lattice_exit(block, inverse_step, r, i, count);
         count_region(a, skipped);
@@ -347,6 +351,7 @@ int march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) f
         if (AMRTEX_PREINTEGRATED && skipped && inside) pass_points(a, block, r, first, i);
 #endif
       } while (skipped && i < count);
+      if (AMRTEX_SKIPS_IN_STAGES && !skipped) open_region(r);
       if (stencils && !skipped) i = march_lattice_stencil(a, block, r, first, count);
       if (!stencils && !skipped) i = march_lattice_region(a, block, r, first, i);
     } while (i < count && !ray_stopped(a));
@@ -528,7 +533,7 @@ void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
     ray_real length = ray_real(0);
     bool skipped = true;
     do {  // the next region that can be seen: all lanes of a SIMD group then sample together
-      bool inside = locate(p, r);
+      bool inside = march_locate(a, p, r);
       front.t = t;
       front.p = p;
       f = ray_vec3(p.cell - r.lower) + ray_vec3(p.fraction);
@@ -548,6 +553,7 @@ void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
       p = leave_region(ray, r, t, bvec3(x, y, !x && !y));
       more = more && all(greaterThanEqual(p.cell, ivec3(0))) && all(lessThan(p.cell, u_domain_cells));
     } while (skipped && more);
+    if (AMRTEX_SKIPS_IN_STAGES && !skipped) open_region(r);
     if (!skipped && length > ray_real(0)) front.part = march_adaptive_region(a, r, vec3r(f), direction, real(length), front.t, part);
     part = real(0.5);
   } while (more && !ray_stopped(a));

@@ -147,6 +147,7 @@ EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy
                          const Json& parameters) {
   require_fields(encoding, hierarchy, request);
   require_level_of_detail(encoding, request.needs);
+  require_analytic_gradients(encoding, request.needs);
   require_float_values(encoding, hierarchy, request);
   EncodedField field;
   field.encoding = encoding.name();

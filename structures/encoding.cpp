@@ -163,6 +163,17 @@ void require_level_of_detail(const Encoding& encoding, const SceneNeeds& needs) 
                   support.reason, fmt::join(others, ", ")));
 }
 
+void require_analytic_gradients(const Encoding& encoding, const SceneNeeds& needs) {
+  const Support support = encoding.analytic_gradients(needs.filter);
+  if (!needs.analytic_gradients || support.ok) return;
+  std::vector<std::string> others;
+  for (const Encoding* e : all_encodings())
+    for (const Filter filter : e->filters())
+      if (e->analytic_gradients(filter).ok) others.push_back(fmt::format("{} with {}", e->name(), filter_name(filter)));
+  throw UnsupportedError(fmt::format("encoding {}: no analytic gradient of {} (shading analytic): {}; there is one of {}",
+                                     encoding.name(), filter_name(needs.filter), support.reason, fmt::join(others, ", ")));
+}
+
 void require_fields(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request) {
   if (!request.needs.invisible.empty() && !encoding.prunes()) {
     std::vector<std::string_view> names;

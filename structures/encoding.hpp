@@ -76,6 +76,7 @@ struct SceneNeeds {
   Filtering filtering = Filtering::manual;
   bool value_ranges = true;      ///< regions are skipped by their value range
   bool gradients = false;        ///< surfaces are lit: stored gradients are of use where an encoding has room for them
+  bool analytic_gradients = false;  ///< surfaces are lit by the derivative of f, which the encoding itself computes
   bool level_of_detail = false;  ///< refined cells may be drawn in place of what lies below them
   bool draw_boxes = false;       ///< the consumer draws box by box: EncodedField::draw_tree, where the encoding can give one
   bool everything = false;       ///< nothing is left out for want of need: what leaving out saves is measured against this
@@ -181,6 +182,8 @@ class Encoding {
   virtual Support supported(const ContextInfo& context) const = 0;
   /// Values of parameters that build() refuses for want of something in the context, for tables and messages.
   virtual std::vector<UnsupportedValue> unsupported_values(const ContextInfo& /*context*/) const { return {}; }
+  /// Can its GLSL give the derivative of f under a filter (SceneNeeds::analytic_gradients)? Else why not.
+  virtual Support analytic_gradients(Filter /*filter*/) const { return {false, "its GLSL has differences of values alone"}; }
   /// Can refined cells be drawn in place of what lies below them (SceneNeeds::level_of_detail)? Else why not.
   virtual Support level_of_detail() const { return {false, "it stores no values of refined cells"}; }
   /// Can parts that the transfer function hides be left out (SceneNeeds::invisible)? Others refuse to be asked.
@@ -202,6 +205,8 @@ Json complete_parameters(const Encoding& encoding, const Json& given);
 void require_filter(const Encoding& encoding, Filter filter);
 /// Throws UnsupportedError with the reason and the encodings that have it when a level of detail is needed and not there.
 void require_level_of_detail(const Encoding& encoding, const SceneNeeds& needs);
+/// The same of analytic gradients.
+void require_analytic_gradients(const Encoding& encoding, const SceneNeeds& needs);
 /// Throws UsageError that says how many fields are supported, or which index the mesh does not have, and
 /// UnsupportedError where parts are to be left out and the encoding has none that could be.
 void require_fields(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request);

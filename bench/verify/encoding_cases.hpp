@@ -4,11 +4,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -134,17 +136,34 @@ inline EncodingCase default_case(const Encoding& encoding, Filter filter, const 
   throw Error(fmt::format("encoding {}: lists the filter {} and no parameter takes it", encoding.name(), filter_name(filter)));
 }
 
-/// The default case, and with it every declared name and the two smallest declared numbers of each parameter.
+/// What shaders read of a case on small meshes of every kind: a parameter that changes none of it makes no other case.
+inline std::string content_of(const EncodingCase& c) {
+  static const std::array<AmrHierarchy, 4> meshes{nested(waves).hierarchy(), single_level(waves).hierarchy(),
+                                                  jump_of_two(waves).hierarchy(), holes_and_missing(waves).hierarchy()};
+  std::string content;
+  for (const AmrHierarchy& h : meshes) {
+    if (!accepted(h, c)) continue;
+    const EncodedField field = build(h, c);
+    content += field.content_hash();
+    for (const auto& [name, value] : field.shader.defines) content += fmt::format(" {}={}", name, value);
+  }
+  return content;
+}
+
+/// The default case, and with it every declared name and the two smallest declared numbers of each parameter, where they change
+/// anything.
 inline std::vector<EncodingCase> variants(const Encoding& encoding, Filter filter, const ContextInfo& limits = {}) {
   const EncodingCase base = default_case(encoding, filter, limits);
   std::vector<EncodingCase> cases{base};
+  std::set<std::string> contents{content_of(base)};
   for (const ParameterInfo& p : encoding.parameters()) {
     int numbers = 0;
     for (const Json& value : declared_values(p)) {
       if (value.is_number() && ++numbers > 2) continue;
       EncodingCase c = base;
       c.parameters[p.name] = value;
-      if (value != p.default_value && c.parameters != base.parameters && accepted(c)) cases.push_back(std::move(c));
+      if (value != p.default_value && c.parameters != base.parameters && accepted(c) && contents.insert(content_of(c)).second)
+        cases.push_back(std::move(c));
     }
   }
   return cases;

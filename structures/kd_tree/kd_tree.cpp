@@ -8,12 +8,12 @@
 #include <cmath>
 #include <map>
 
-#include "brick_packing.hpp"
 #include "hidden_leaves.hpp"
 #include "kd_detail.hpp"
 #include "kd_draw_tree.hpp"
 #include "kd_partition.hpp"
 #include "start_grid.hpp"
+#include "structures/brick_packing.hpp"
 #include "structures/build_tools.hpp"
 #include "structures/level_values.hpp"
 #include "structures/texture_handles.hpp"

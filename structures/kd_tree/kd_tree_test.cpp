@@ -8,7 +8,7 @@
 #include <chrono>
 
 #include "renderers/raycaster.hpp"
-#include "structures/kd_tree/brick_packing.hpp"
+#include "structures/brick_packing.hpp"
 #include "structures/kd_tree/kd_detail.hpp"
 #include "structures/kd_tree/kd_partition.hpp"
 #include "structures/kd_tree/start_grid.hpp"
