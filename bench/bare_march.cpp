@@ -55,6 +55,7 @@ class BareMarch {
     ShaderKey key;
     key.entry = "bare_march.frag";
     key.define("AMRTEX_RAY_DOUBLE", 0);
+    key.define("AMRTEX_CLIP_PLANES", 0);
     return key;
   }
 

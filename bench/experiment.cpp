@@ -28,16 +28,15 @@ constexpr auto kAvailableRenderKeys = std::to_array<std::string_view>(
     {"mode",      "sampling",     "step",        "width",       "height",      "skip",          "early_end",
      "consumer",  "slice_target", "integrator",  "isovalues",   "iso_opacity", "surface_color", "iso_tolerance",
      "shading",   "output",       "color_field", "point_light", "ambient",     "shadow_step",   "level_of_detail",
-     "max_level", "tolerance",    "prune",       "needs"});
-constexpr std::array<std::string_view, 1> kLaterRenderKeys = {"clip_planes"};
+     "max_level", "tolerance",    "prune",       "needs",       "clip_planes"});
 constexpr std::array<std::string_view, 2> kNeeds = {"scene", "all"};
 constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
 
 /// How many lists deep one value of this key is; what lies deeper is an axis.
 int value_depth(std::string_view key) {
-  if (key == "extinction" || key == "color" || key == "surface_color") return 2;
-  constexpr std::array<std::string_view, 11> lists = {"point_light", "more_fields", "eye",  "at",    "up",         "isovalues",
-                                                      "iso_opacity", "clip_planes", "root", "ratio", "skip_levels"};
+  if (key == "extinction" || key == "color" || key == "surface_color" || key == "clip_planes") return 2;
+  constexpr std::array<std::string_view, 10> lists = {"point_light", "more_fields", "eye",  "at",    "up",
+                                                      "isovalues",   "iso_opacity", "root", "ratio", "skip_levels"};
   return std::find(lists.begin(), lists.end(), key) != lists.end() ? 1 : 0;
 }
 
@@ -349,16 +348,10 @@ class Parser {
     if (!node) return {RenderPoint{}};
     std::vector<RenderPoint> points;
     for (const JsonNode& render : node->items()) {
-      for (const auto& [key, value] : render.members()) refuse_later(key, value);
       render.accept_keys(kAvailableRenderKeys);
       for (const Choice& choice : combinations(render)) points.push_back(parse_setting(choice));
     }
     return points;
-  }
-
-  static void refuse_later(const std::string& key, const JsonNode& node) {
-    if (std::find(kLaterRenderKeys.begin(), kLaterRenderKeys.end(), key) != kLaterRenderKeys.end())
-      node.fail(fmt::format("not available in this version; available: {}", fmt::join(kAvailableRenderKeys, ", ")));
   }
 
   static RenderPoint parse_setting(const Choice& choice) {
@@ -456,6 +449,19 @@ class Parser {
     if (key == "color_field" && !node.json().is_null()) iso.color_field = node.text();
   }
 
+  /// Planes [a, b, c, d].
+  static std::vector<ClipPlane> clip_planes(const JsonNode& node) {
+    std::vector<ClipPlane> planes;
+    if (node.json().is_null() || (node.json().is_array() && node.json().empty())) return planes;
+    for (const JsonNode& item : node.items()) {
+      const std::vector<double> p = numbers(item);
+      if (p.size() != 4) item.fail("accepted: planes [a, b, c, d], which keep a x + b y + c z >= d in world units");
+      planes.push_back({{p[0], p[1], p[2]}, p[3]});
+    }
+    located(node, [&] { validate_clip_planes(planes); });
+    return planes;
+  }
+
   static double tolerance_of(const JsonNode& node) {
     const double tolerance = node.positive_number();
     if (tolerance > 1) node.fail(fmt::format("{} is more than a channel holds; accepted: a number in (0, 1]", tolerance));
@@ -467,6 +473,7 @@ class Parser {
     set_surfaces(s.isosurfaces, key, node);
     if (key == "mode") s.mode = located(node, [&] { return parse_mode(node.text()); });
     if (key == "sampling") s.sampling = located(node, [&] { return parse_sampling(node.text()); });
+    if (key == "clip_planes") s.clip_planes = clip_planes(node);
     if (key == "step") s.step = node.positive_number();
     if (key == "width") s.width = static_cast<int>(node.integer(1, kMaxPictureEdge));
     if (key == "height") s.height = static_cast<int>(node.integer(1, kMaxPictureEdge));
@@ -670,6 +677,12 @@ Json light_json(const PointLight& light) {
   return {{"point_light", {p.x, p.y, p.z}}, {"ambient", light.ambient}, {"shadow_step", light.shadow_step}};
 }
 
+Json clip_planes_json(const std::vector<ClipPlane>& planes) {
+  Json json = Json::array();
+  for (const ClipPlane& p : planes) json.push_back({p.normal.x, p.normal.y, p.normal.z, p.distance});
+  return json;
+}
+
 Json render_json(const RenderPoint& render) {
   const RenderSettings& s = render.settings;
   const bool by_tolerance = s.integrator == Integrator::tolerance;
@@ -693,6 +706,7 @@ Json render_json(const RenderPoint& render) {
   if (s.draws_surfaces()) json.update(surfaces_json(s.isosurfaces));
   if (s.point_light) json.update(light_json(*s.point_light));
   // only where they are in use, so that the names of other records stay
+  if (!s.clip_planes.empty()) json["clip_planes"] = clip_planes_json(s.clip_planes);
   if (s.level_of_detail) json["level_of_detail"] = *s.level_of_detail;
   if (s.max_level) json["max_level"] = *s.max_level;
   if (!render.transfer_function_name.empty()) {

@@ -11,6 +11,7 @@
 #include <map>
 #include <mutex>
 
+#include "renderers/reference_clip.hpp"
 #include "renderers/reference_field.hpp"
 #include "renderers/reference_light.hpp"
 #include "renderers/reference_point.hpp"
@@ -31,7 +32,8 @@ struct Drawing {
   Mode mode;
   double part;  // world length of the largest part
   const TransferTable* table;
-  const AnalyticField* truth;  // drawn instead of the field, where it is not null
+  const AnalyticField* truth;     // drawn instead of the field, where it is not null
+  std::vector<ClipPlane> planes;  // finest cells
 };
 
 Vec3d to_index(const AmrHierarchy& h, const Vec3d& p_world) {
@@ -50,17 +52,15 @@ Drawing make_drawing(const AmrHierarchy& h, const Scene& scene, double step, con
             scene.settings.mode,
             step * std::min({spacing.x, spacing.y, spacing.z}),
             table,
-            truth};
+            truth,
+            {}};
+  for (const ClipPlane& plane : scene.settings.clip_planes) d.planes.push_back(in_finest_cells(h, plane));
   if (scene.region) {
     d.lower = glm::max(d.lower, to_index(h, (*scene.region)[0]));
     d.upper = glm::min(d.upper, to_index(h, (*scene.region)[1]));
   }
   return d;
 }
-
-struct Span {
-  double from, to;
-};
 
 /// The ray's stretch in a closed box, not before its start; nullopt where they do not meet.
 std::optional<Span> stretch_in(const IndexRay& ray, const Vec3d& lower, const Vec3d& upper) {
@@ -172,8 +172,9 @@ LightIntegral::Arriving arriving_light(Worker& worker, const IndexRay& ray) {
 void draw_pixel(Worker& worker, const Drawing& drawing, int x, int y, Picture& picture) {
   const WorldRay world = camera_ray(drawing.camera, x, y, picture.width, picture.height);
   IndexRay ray{(world.origin - drawing.domain_lower) * drawing.cells_a_length, world.direction * drawing.cells_a_length};
-  const auto span = stretch_in(ray, drawing.lower, drawing.upper);
-  if (!span) return;
+  auto span = stretch_in(ray, drawing.lower, drawing.upper);
+  if (span) span = cut(ray, drawing.planes, *span);
+  if (!span || !(span->to > span->from)) return;
   ray.origin += span->from * ray.direction;  // from here on no digits are spent on the way to the mesh
   const double end = span->to - span->from;
   double* pixel = picture.pixel(x, y);
@@ -201,6 +202,7 @@ void check(const Scene& scene, double step) {
   if (scene.settings.draws_volume()) validate(scene.transfer_function);
   if (scene.settings.draws_surfaces()) validate(scene.settings.isosurfaces);
   validate_light(scene.settings);
+  validate_clip_planes(scene.settings.clip_planes);
 }
 
 double extinction_scale(const AmrHierarchy& h, const TransferFunction& tf) {

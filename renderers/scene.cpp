@@ -346,6 +346,34 @@ void validate_light(const RenderSettings& s) {
                                measures ? fmt::format(" with output {}", output_name(s.isosurfaces.output)) : ""));
 }
 
+void validate_clip_planes(const std::vector<ClipPlane>& planes) {
+  if (planes.size() > kMostClipPlanes)
+    throw UsageError(fmt::format("'clip_planes' has {} planes; at most {} are supported", planes.size(), kMostClipPlanes));
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    const Vec3d& n = planes[i].normal;
+    if (!finite(n) || !std::isfinite(planes[i].distance))
+      throw UsageError(fmt::format("'clip_planes' plane {}: [{}, {}, {}, {}] must be four finite numbers", i, n.x, n.y, n.z,
+                                   planes[i].distance));
+    if (n == Vec3d(0))
+      throw UsageError(
+          fmt::format("'clip_planes' plane {}: the normal (0, 0, 0) has no direction; accepted: [a, b, c, d] with "
+                      "a, b or c other than 0, which keeps a x + b y + c z >= d",
+                      i));
+  }
+}
+
+ClipPlane in_finest_cells(const AmrHierarchy& h, const ClipPlane& plane) {
+  const auto largest = [](const Vec3d& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); };
+  const double size = largest(plane.normal);
+  const Vec3d spacing = h.spacing(h.finest_level());
+  const double unit = largest(spacing);
+  const Vec3d normal = plane.normal / size;
+  const Vec3d in_cells = normal * (spacing / unit);
+  const double distance = plane.distance / size - glm::dot(normal, h.domain_lower());
+  const double scale = largest(in_cells);
+  return {in_cells / scale, distance / unit / scale};
+}
+
 TransferFunction surface_colors(const Scene& scene) {
   TransferFunction map = scene.transfer_function;
   if (!scene.settings.isosurfaces.color.empty()) {

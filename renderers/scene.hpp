@@ -126,6 +126,15 @@ struct PointLight {
   double shadow_step = 1;  ///< of the secondary ray: cell widths of each region (smallest edge)
 };
 
+/// A plane that cuts what is drawn: points with dot(normal, p) >= distance are kept.
+struct ClipPlane {
+  Vec3d normal{1, 0, 0};  ///< world, of any length but 0
+  double distance = 0;    ///< from the world's origin, in lengths of the normal
+};
+inline constexpr std::size_t kMostClipPlanes = 8;
+/// The same plane in cells of the finest level, with a normal whose largest component is 1.
+ClipPlane in_finest_cells(const AmrHierarchy& hierarchy, const ClipPlane& plane);
+
 struct RenderSettings {
   ConsumerKind consumer = ConsumerKind::raycast;
   SliceTarget slice_target = SliceTarget::rgba32f;  ///< consumers `slices` and `stencil_slices`
@@ -142,6 +151,7 @@ struct RenderSettings {
   bool everything = false;          ///< structures hold also what the scene does not need, to see what leaving out saves
   Isosurfaces isosurfaces;
   std::optional<PointLight> point_light;  ///< absent: light of all places alike
+  std::vector<ClipPlane> clip_planes;     ///< at most kMostClipPlanes; drawn is what all of them keep, and a cut is no surface
   /// Refined cells are drawn themselves where they are smaller on the picture, pixels; off when absent.
   std::optional<double> level_of_detail;
   std::optional<int> max_level;  ///< nothing finer is drawn where a cell of this level or a coarser one lies; off when absent
@@ -158,6 +168,8 @@ struct RenderSettings {
 void validate_prune(const RenderSettings& settings);
 /// Throws UsageError: a lamp whose numbers are none, or in a picture without a volume. Nothing where there is no lamp.
 void validate_light(const RenderSettings& settings);
+/// Throws UsageError that names the plane: too many, no direction, numbers that are none.
+void validate_clip_planes(const std::vector<ClipPlane>& planes);
 /// Throws UsageError where the integrator does not go with the mode, the sampling or the tolerance.
 void validate_integrator(const RenderSettings& settings);
 

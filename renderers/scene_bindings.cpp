@@ -240,6 +240,18 @@ void add_light(const AmrHierarchy& h, const RenderSettings& s, SceneBindings& b)
   b.uniforms.push_back({"u_shadow_step", std::vector<double>{s.point_light->shadow_step}});
 }
 
+void add_clip_planes(const AmrHierarchy& h, const RenderSettings& s, SceneBindings& b) {
+  validate_clip_planes(s.clip_planes);
+  b.defines.emplace_back("AMRTEX_CLIP_PLANES", static_cast<int>(s.clip_planes.size()));
+  constexpr double kFar = 1e30;  // a plane beyond it keeps all or nothing, and is a float
+  std::vector<double> planes;
+  for (const ClipPlane& plane : s.clip_planes) {
+    const ClipPlane p = in_finest_cells(h, plane);
+    planes.insert(planes.end(), {p.normal.x, p.normal.y, p.normal.z, std::clamp(p.distance, -kFar, kFar)});
+  }
+  if (!planes.empty()) b.uniforms.push_back({"u_clip_planes", planes, true});
+}
+
 void require_detail(const EncodedField& field, const RenderSettings& s) {
   const auto& defines = field.shader.defines;
   const auto it = std::find(defines.begin(), defines.end(), std::pair<std::string, int>("AMRTEX_LEVEL_OF_DETAIL", 1));
@@ -402,6 +414,7 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
                {"AMRTEX_SKIP", s.skip ? 1 : 0},
                {"AMRTEX_EARLY_END", (s.early_end || by_tolerance) && s.draws_volume() ? 1 : 0},
                {"AMRTEX_ISOVALUES", s.draws_surfaces() ? static_cast<int>(s.isosurfaces.values.size()) : 0}};
+  add_clip_planes(h, s, b);
   add_light(h, s, b);
   if (s.draws_surfaces()) add_surfaces(scene, field, b);
   add_integrator(scene, field, extinction_unit(h, scene), b);

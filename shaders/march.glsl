@@ -354,6 +354,16 @@ int march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) f
   return i;
 }
 
+// ---- a ray that is cut begins inside of an interval of its lattice, whose places stay: what is left of that one is an interval
+// of its own (its head), with a sample in its own middle.
+#define AMRTEX_CUT (AMRTEX_CLIP_PLANES > 0)
+
+// The first interval that is drawn in full.
+int first_interval(IN(Ray) ray) { return AMRTEX_CUT ? int(ceil(ray.first / ray_real(u_step))) : 0; }
+
+// Where the head ends.
+ray_real head_end(IN(Ray) ray) { return min(ray_real(u_step) * ray_real(first_interval(ray)), ray.length); }
+
 // A sample at `at` as a block of one, which lies at p. `whole`: full intervals before its own.
 LatticeBlock lattice_point(IN(Ray) ray, IN(int) whole, IN(ray_real) at, OUT(Position) p) {
   LatticeBlock block;
@@ -383,36 +393,44 @@ void march_lattice_point(INOUT(Accumulation) a, IN(Ray) ray, IN(int) whole, IN(r
 #endif
 }
 
-// The interval that is left after `whole` full ones.
-void march_lattice_rest(INOUT(Accumulation) a, IN(Ray) ray, IN(int) whole) {
-  ray_real start = ray_real(u_step) * ray_real(whole);
-  real length = real(ray.length - start);
-  if (AMRTEX_PREINTEGRATED) {  // the last full one's end, and the ray's
+// The interval from `start` to `end`, shorter than others: what is left after `whole` full ones, or a head.
+void march_lattice_part(INOUT(Accumulation) a, IN(Ray) ray, IN(int) whole, IN(ray_real) start, IN(ray_real) end) {
+  real length = real(end - start);
+  if (AMRTEX_PREINTEGRATED) {  // the end of the last full one, where there is one, and its own
     int i = 0;
     do {
-      march_lattice_point(a, ray, whole, start, i == 0 ? start : ray.length, i == 0 ? u_step : length);
+      march_lattice_point(a, ray, whole, start, i == 0 ? start : end, i == 0 ? u_step : length);
       i += 1;
     } while (i < 2 && length > real(0));
     return;
   }
   bool left = AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_LEFT;
-  march_lattice_point(a, ray, whole, start, left ? start : (start + ray.length) * ray_real(0.5), length);
+  march_lattice_point(a, ray, whole, start, left ? start : (start + end) * ray_real(0.5), length);
+}
+
+void march_head(IN(Ray) ray, INOUT(Accumulation) a) {
+  ray_real end = head_end(ray);
+  if (AMRTEX_LATTICE == 0 || !(ray.first < end)) return;
+  march_lattice_part(a, ray, first_interval(ray), ray.first, end);
+  a.end_state = AMRTEX_END_NONE;  // the lattice takes the point at its end itself
 }
 
 // Three nested loops (blocks, regions, samples): what is computed in an inner one is paid
 // by every lane of a SIMD group at every turn.
 void march_lattice(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
   int whole = int(floor(ray.length / ray_real(u_step)));
-  int first = AMRTEX_ISOVALUES == 0 ? 0 : front.next & ~(AMRTEX_BLOCK - 1);
+  bool begins_later = AMRTEX_ISOVALUES != 0 || AMRTEX_CUT;
+  int first = begins_later ? front.next & ~(AMRTEX_BLOCK - 1) : 0;
   if (first < whole) {
     do {
-      int from = AMRTEX_ISOVALUES == 0 ? 0 : max(front.next - first, 0);
+      int from = begins_later ? max(front.next - first, 0) : 0;
       front.next = first + march_lattice_block(a, lattice_block(ray, first), from, min(whole - first, AMRTEX_BLOCK));
       first += AMRTEX_BLOCK;
     } while (first < whole && !ray_stopped(a));
   }
   bool rest = AMRTEX_PREINTEGRATED || ray_real(u_step) * ray_real(whole) < ray.length;
-  if (rest && !ray_stopped(a)) march_lattice_rest(a, ray, whole);
+  rest = rest && first_interval(ray) <= whole;  // else the head was all
+  if (rest && !ray_stopped(a)) march_lattice_part(a, ray, whole, ray_real(u_step) * ray_real(whole), ray.length);
 }
 
 // ---- adaptive: each region is divided into equal intervals of at most `step` of its own cells.
@@ -583,16 +601,17 @@ vec4r volume_picture(IN(Accumulation) a) {
 // The picture's value for one ray.
 vec4r march_ray(IN(Ray) ray, INOUT(Accumulation) a) {
   Front front;
-  front.next = 0;
-  front.t = ray_real(0);
-  front.p = make_position(ray.entry);
+  front.next = first_interval(ray);
+  front.t = ray.first;
+  front.p = make_position(AMRTEX_CUT ? ray.entry + ray.direction * ray.first : ray.entry);
   front.part = real(0.5);
+  if (AMRTEX_CUT) march_head(ray, a);
 #if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
   if (AMRTEX_ISOVALUES != 0) {
-    march_surfaces(ray, a, front);
+    if (!AMRTEX_CUT || !ray_ended(a)) march_surfaces(ray, a, front);
     return surface_picture(a);
   }
 #endif
-  march(ray, a, front);
+  if (!AMRTEX_CUT || !ray_ended(a)) march(ray, a, front);
   return volume_picture(a);
 }

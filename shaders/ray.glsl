@@ -1,4 +1,4 @@
-// Camera rays, clipped to the box that is drawn.
+// Camera rays, clipped to the box that is drawn and cut by planes.
 // Ray space: finest cells along each axis; lengths in units of the smallest edge of a
 // finest cell, so that with cubic cells one unit is one cell.
 UNIFORM(ray_vec3, u_eye)             // finest
@@ -12,12 +12,37 @@ UNIFORM(ray_vec3, u_draw_upper)      // finest
 UNIFORM(vec2r, u_picture_size)       // pixels
 UNIFORM(real, u_length_unit)         // world length of one unit of ray length
 
+#if !AMRTEX_CPP
+#ifndef AMRTEX_CLIP_PLANES
+#error AMRTEX_CLIP_PLANES must be defined: how many planes cut what is drawn; 0 leaves them out
+#endif
+#endif
+DEFINE_INT(AMRTEX_CLIP_PLANES)
+
 STRUCT Ray {
   ray_vec3 entry;      // finest: where it enters the drawn box, or the eye inside it
   ray_vec3 direction;  // finest cells a unit of length
   ray_real length;     // units, from entry to exit
   ray_real start;      // units, from where the camera sends it to the entry
+  ray_real first;      // units, from the entry to where drawing begins: 0, or on the plane that cuts it there
 };
+
+#if AMRTEX_CPP || AMRTEX_CLIP_PLANES > 0
+UNIFORM_ARRAY(ray_real, u_clip_planes, 4 * AMRTEX_CLIP_PLANES, 32)  // a, b, c, d of each: a x + b y + c z >= d is kept; finest
+
+// Cuts a ray that begins at its entry. False where nothing is left. The entry stays, so that samples keep their places.
+bool clip_ray(INOUT(Ray) ray) {
+  for (int i = 0; i < AMRTEX_CLIP_PLANES; ++i) {
+    ray_vec3 normal = ray_vec3(u_clip_planes[4 * i], u_clip_planes[4 * i + 1], u_clip_planes[4 * i + 2]);
+    ray_real height = dot(normal, ray.entry) - u_clip_planes[4 * i + 3];
+    ray_real rise = dot(normal, ray.direction);
+    if (rise == ray_real(0) && height < ray_real(0)) return false;
+    if (rise > ray_real(0)) ray.first = max(ray.first, -height / rise);
+    if (rise < ray_real(0)) ray.length = min(ray.length, -height / rise);
+  }
+  return ray.length > ray.first;
+}
+#endif
 
 // False when the pixel's ray misses the box. `pixel`: centre, from the lower left.
 bool camera_ray(IN(vec2r) pixel, OUT(Ray) ray) {
@@ -34,6 +59,7 @@ bool camera_ray(IN(vec2r) pixel, OUT(Ray) ray) {
   ray.entry = origin;
   ray.length = ray_real(0);
   ray.start = ray_real(0);
+  ray.first = ray_real(0);
   for (int axis = 0; axis < 3; ++axis) {
     ray_real o = origin[axis];
     ray_real d = ray.direction[axis];
@@ -50,6 +76,9 @@ bool camera_ray(IN(vec2r) pixel, OUT(Ray) ray) {
   ray.entry = clamp(origin + ray.direction * enter, u_draw_lower, u_draw_upper);
   ray.length = leave - enter;
   ray.start = enter;
+#if AMRTEX_CPP || AMRTEX_CLIP_PLANES > 0
+  if (AMRTEX_CLIP_PLANES > 0) return clip_ray(ray);
+#endif
   return true;
 }
 

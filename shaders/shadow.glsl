@@ -22,7 +22,7 @@ vec3r safe_inverse(IN(vec3r) v);
 Position leave_region(IN(Ray) ray, IN(Region) r, IN(ray_real) t, IN(bvec3) through);
 #endif
 
-// What lies between a place and the lamp, up to the drawn box: a ray of length 0 where it is at the lamp.
+// What lies between a place and the lamp, up to the drawn box and the planes that cut it: a ray of length 0 where it is at the lamp.
 Ray ray_to_lamp(IN(Position) p) {
   Ray ray;
   ray.entry = ray_vec3(p.cell) + ray_vec3(p.fraction);
@@ -32,6 +32,7 @@ Ray ray_to_lamp(IN(Position) p) {
   ray.direction = ray_vec3(1, 0, 0);
   ray.length = ray_real(0);
   ray.start = ray_real(0);
+  ray.first = ray_real(0);
   if (largest > ray_real(0)) {
     ray_real in_largest = length(way / largest);
     ray.direction = way / largest / in_largest * u_cells_per_unit;
@@ -42,6 +43,10 @@ Ray ray_to_lamp(IN(Position) p) {
     if (d > ray_real(0)) ray.length = min(ray.length, (u_draw_upper[axis] - ray.entry[axis]) / d);
     if (d < ray_real(0)) ray.length = min(ray.length, (u_draw_lower[axis] - ray.entry[axis]) / d);
   }
+#if AMRTEX_CPP || AMRTEX_CLIP_PLANES > 0
+  if (AMRTEX_CLIP_PLANES > 0 && !clip_ray(ray)) ray.length = ray_real(0);
+  ray.first = ray_real(0);  // it begins where something is drawn, whatever rounding says
+#endif
   return ray;
 }
 
