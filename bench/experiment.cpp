@@ -28,7 +28,7 @@ constexpr auto kAvailableRenderKeys = std::to_array<std::string_view>(
     {"mode",      "sampling",     "step",        "width",       "height",      "skip",          "early_end",
      "consumer",  "slice_target", "integrator",  "isovalues",   "iso_opacity", "surface_color", "iso_tolerance",
      "shading",   "output",       "color_field", "point_light", "ambient",     "shadow_step",   "level_of_detail",
-     "max_level", "tolerance",    "prune",       "needs",       "clip_planes"});
+     "max_level", "tolerance",    "prune",       "needs",       "clip_planes", "ray_offset"});
 constexpr std::array<std::string_view, 2> kNeeds = {"scene", "all"};
 constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
 
@@ -80,6 +80,7 @@ Json unnamed_render_json(const RenderPoint& render) {
   json.erase("transfer_function_name");
   if (!render.settings.prune) json.erase("prune");  // older records keep their names
   if (!render.settings.everything) json.erase("needs");
+  if (!render.settings.ray_offset) json.erase("ray_offset");
   return json;
 }
 
@@ -365,6 +366,7 @@ class Parser {
     else
       point.settings.isosurfaces = {};  // other modes have no use for it
     set_light(point.settings, choice);
+    if (const JsonNode* offset = find(choice, "ray_offset")) located(*offset, [&] { validate_ray_offset(point.settings); });
     if (point.settings.prune) require_prunable(point.settings, *find(choice, "prune"));
     return point;
   }
@@ -474,6 +476,7 @@ class Parser {
     if (key == "mode") s.mode = located(node, [&] { return parse_mode(node.text()); });
     if (key == "sampling") s.sampling = located(node, [&] { return parse_sampling(node.text()); });
     if (key == "clip_planes") s.clip_planes = clip_planes(node);
+    if (key == "ray_offset" && node.boolean()) s.ray_offset = 0;  // its seed is the experiment's
     if (key == "step") s.step = node.positive_number();
     if (key == "width") s.width = static_cast<int>(node.integer(1, kMaxPictureEdge));
     if (key == "height") s.height = static_cast<int>(node.integer(1, kMaxPictureEdge));
@@ -580,6 +583,9 @@ class Parser {
 
   void parse_measuring() {
     if (const auto seed = root_.find("seed")) experiment_.seed = static_cast<std::uint64_t>(seed->integer(0, INT64_MAX));
+    for (RenderPoint& render : experiment_.renders)
+      if (render.settings.ray_offset)
+        render.settings.ray_offset = static_cast<std::uint32_t>(experiment_.seed ^ experiment_.seed >> 32);
     if (const auto context = root_.find("context")) experiment_.context = context->one_of(kContexts);
     if (const auto limit = root_.find("memory_limit"); limit && !limit->json().is_null())
       experiment_.memory_limit = limit->integer(1, INT64_MAX);
@@ -697,6 +703,7 @@ Json render_json(const RenderPoint& render) {
                {"prune", s.prune},
                {"needs", s.everything ? "all" : "scene"},
                {"early_end", json_or_null(s.early_end)},
+               {"ray_offset", s.ray_offset.has_value()},
                {"view", to_json(render.view)},
                {"view_name", render.view_name},
                {"transfer_function", nullptr},
@@ -706,6 +713,7 @@ Json render_json(const RenderPoint& render) {
   if (s.draws_surfaces()) json.update(surfaces_json(s.isosurfaces));
   if (s.point_light) json.update(light_json(*s.point_light));
   // only where they are in use, so that the names of other records stay
+  if (s.ray_offset) json["seed"] = *s.ray_offset;
   if (!s.clip_planes.empty()) json["clip_planes"] = clip_planes_json(s.clip_planes);
   if (s.level_of_detail) json["level_of_detail"] = *s.level_of_detail;
   if (s.max_level) json["max_level"] = *s.max_level;

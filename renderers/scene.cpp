@@ -362,6 +362,14 @@ void validate_clip_planes(const std::vector<ClipPlane>& planes) {
   }
 }
 
+void validate_ray_offset(const RenderSettings& s) {
+  if (!s.ray_offset || s.integrator == Integrator::exponential_midpoint || s.integrator == Integrator::euler) return;
+  throw UsageError(
+      fmt::format("'ray_offset' moves intervals that are sampled in their middle: the integrators exponential_midpoint "
+                  "and euler accept it, not {}",
+                  integrator_name(s.integrator)));
+}
+
 ClipPlane in_finest_cells(const AmrHierarchy& h, const ClipPlane& plane) {
   const auto largest = [](const Vec3d& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); };
   const double size = largest(plane.normal);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -152,6 +153,8 @@ struct RenderSettings {
   Isosurfaces isosurfaces;
   std::optional<PointLight> point_light;  ///< absent: light of all places alike
   std::vector<ClipPlane> clip_planes;     ///< at most kMostClipPlanes; drawn is what all of them keep, and a cut is no surface
+  /// Seed of a random offset for each ray, by which its intervals are moved (Wald et al. 2020, section 4.2); off when absent.
+  std::optional<std::uint32_t> ray_offset;
   /// Refined cells are drawn themselves where they are smaller on the picture, pixels; off when absent.
   std::optional<double> level_of_detail;
   std::optional<int> max_level;  ///< nothing finer is drawn where a cell of this level or a coarser one lies; off when absent
@@ -170,6 +173,8 @@ void validate_prune(const RenderSettings& settings);
 void validate_light(const RenderSettings& settings);
 /// Throws UsageError that names the plane: too many, no direction, numbers that are none.
 void validate_clip_planes(const std::vector<ClipPlane>& planes);
+/// Throws UsageError where the integrator's samples are not the middles of intervals that an offset can move.
+void validate_ray_offset(const RenderSettings& settings);
 /// Throws UsageError where the integrator does not go with the mode, the sampling or the tolerance.
 void validate_integrator(const RenderSettings& settings);
 

@@ -252,6 +252,12 @@ void add_clip_planes(const AmrHierarchy& h, const RenderSettings& s, SceneBindin
   if (!planes.empty()) b.uniforms.push_back({"u_clip_planes", planes, true});
 }
 
+void add_ray_offset(const RenderSettings& s, SceneBindings& b) {
+  validate_ray_offset(s);
+  b.defines.emplace_back("AMRTEX_RAY_OFFSET", s.ray_offset ? 1 : 0);
+  if (s.ray_offset) b.uniforms.push_back({"u_ray_seed", std::vector<int>{static_cast<int>(*s.ray_offset)}});
+}
+
 void require_detail(const EncodedField& field, const RenderSettings& s) {
   const auto& defines = field.shader.defines;
   const auto it = std::find(defines.begin(), defines.end(), std::pair<std::string, int>("AMRTEX_LEVEL_OF_DETAIL", 1));
@@ -415,6 +421,7 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
                {"AMRTEX_EARLY_END", (s.early_end || by_tolerance) && s.draws_volume() ? 1 : 0},
                {"AMRTEX_ISOVALUES", s.draws_surfaces() ? static_cast<int>(s.isosurfaces.values.size()) : 0}};
   add_clip_planes(h, s, b);
+  add_ray_offset(s, b);
   add_light(h, s, b);
   if (s.draws_surfaces()) add_surfaces(scene, field, b);
   add_integrator(scene, field, extinction_unit(h, scene), b);

@@ -35,7 +35,7 @@ void march_lattice_box(IN(Ray) ray, IN(Region) r, INOUT(Accumulation) a) {
   ray_real enter;
   ray_real leave;
   if (!region_interval(ray, r, AMRTEX_BOX_MARGIN, enter, leave)) return;
-  int whole = int(floor(ray.length / ray_real(u_step)));
+  int whole = full_intervals(ray);
   int from = max(int(floor(enter / ray_real(u_step))) - 2, first_interval(ray));
   int to = min(int(ceil(leave / ray_real(u_step))) + 2, whole);
   int first = from & ~(AMRTEX_BLOCK - 1);
@@ -57,7 +57,7 @@ void march_lattice_box(IN(Ray) ray, IN(Region) r, INOUT(Accumulation) a) {
     } while (first < to);
   }
   for (int i = AMRTEX_CUT ? 0 : 1; i < 2; ++i) {  // the intervals before and behind the full ones
-    ray_real start = i == 0 ? ray.first : ray_real(u_step) * ray_real(whole);
+    ray_real start = i == 0 ? ray.first : interval_begin(ray, whole);
     ray_real end = i == 0 ? head_end(ray) : ray.length;
     if (start < end && (i == 0 || first_interval(ray) <= whole)) {
       Position p;
@@ -74,7 +74,7 @@ void march_adaptive_box(IN(Ray) ray, IN(Region) r, INOUT(Accumulation) a) {
   if (!region_interval(ray, r, ray_real(0), enter, leave)) return;
   vec3r f = vec3r(ray.entry + ray.direction * enter - ray_vec3(r.lower));
   f = clamp(f, vec3r(0), vec3r(r.upper - r.lower));
-  march_adaptive_region(a, r, f, vec3r(ray.direction), real(leave - enter), enter, real(0.5));
+  march_adaptive_region(a, r, f, vec3r(ray.direction), real(leave - enter), enter, real(0.5), ray.phase);
 }
 
 void march_box(IN(Ray) ray, IN(Region) r, INOUT(Accumulation) a) {

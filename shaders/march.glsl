@@ -158,6 +158,27 @@ STRUCT Front {
 // AMRTEX_BLOCK samples and lie on a grid of 2^-12 of a finest cell, so that sums of cell and
 // fraction are exact and encodings with other regions see the same bits.
 #define AMRTEX_BLOCK 256
+// A ray that a plane cuts begins inside of an interval, and so does one whose intervals are moved: what is left of it is an
+// interval of its own (the head), with a sample in its own middle.
+#define AMRTEX_CUT (AMRTEX_CLIP_PLANES > 0 || AMRTEX_RAY_OFFSET != 0)
+
+ray_real interval_begin(IN(Ray) ray, IN(int) k) {
+  if (AMRTEX_RAY_OFFSET != 0) return ray_real(u_step) * (ray_real(k) + ray_real(ray.phase));
+  return ray_real(u_step) * ray_real(k);
+}
+
+// The first interval that is drawn in full, ...
+int first_interval(IN(Ray) ray) {
+  return AMRTEX_CUT ? max(int(ceil(ray.first / ray_real(u_step) - ray_real(ray.phase))), 0) : 0;
+}
+
+// ... and the one behind the last.
+int full_intervals(IN(Ray) ray) {
+  if (AMRTEX_RAY_OFFSET != 0) return max(int(floor(ray.length / ray_real(u_step) - ray_real(ray.phase))), 0);
+  return int(floor(ray.length / ray_real(u_step)));
+}
+
+ray_real head_end(IN(Ray) ray) { return min(interval_begin(ray, first_interval(ray)), ray.length); }
 #define AMRTEX_QUANTA real(4096)
 #define AMRTEX_QUANTUM real(0.000244140625)
 
@@ -166,16 +187,18 @@ STRUCT LatticeBlock {
   vec3r fraction;  // ... and fraction, in quanta
   vec3r step;      // quanta a sample
   int first;       // its first sample, counted from the ray's entry
+  real phase;      // of the ray
 };
 
 LatticeBlock lattice_block(IN(Ray) ray, IN(int) first) {
   LatticeBlock block;
-  ray_real t = ray_real(u_step) * ray_real(first);
+  ray_real t = interval_begin(ray, first);
   Position anchor = make_position(ray.entry + ray.direction * t);
   block.cell = anchor.cell;
   block.fraction = anchor.fraction * AMRTEX_QUANTA;
   block.step = vec3r(ray.direction) * (u_step * AMRTEX_QUANTA);
   block.first = first;
+  block.phase = ray.phase;
   return block;
 }
 
@@ -258,7 +281,10 @@ vec3r lattice_q(IN(LatticeBlock) block, IN(LatticeFrame) frame, IN(Region) r, IN
 }
 
 // Where sample i of the block lies, or with - 1/2 where its interval begins (units of ray length).
-ray_real lattice_place(IN(LatticeBlock) block, IN(real) i) { return ray_real(u_step) * (ray_real(block.first) + ray_real(i)); }
+ray_real lattice_place(IN(LatticeBlock) block, IN(real) i) {
+  if (AMRTEX_RAY_OFFSET != 0) return ray_real(u_step) * (ray_real(block.first) + ray_real(block.phase) + ray_real(i));
+  return ray_real(u_step) * (ray_real(block.first) + ray_real(i));
+}
 
 #if AMRTEX_CPP || AMRTEX_PREINTEGRATED
 // Points first to next - 1 lie in a region that cannot be seen: no interval between them can, but those before and
@@ -354,16 +380,6 @@ int march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) f
   return i;
 }
 
-// ---- a ray that is cut begins inside of an interval of its lattice, whose places stay: what is left of that one is an interval
-// of its own (its head), with a sample in its own middle.
-#define AMRTEX_CUT (AMRTEX_CLIP_PLANES > 0)
-
-// The first interval that is drawn in full.
-int first_interval(IN(Ray) ray) { return AMRTEX_CUT ? int(ceil(ray.first / ray_real(u_step))) : 0; }
-
-// Where the head ends.
-ray_real head_end(IN(Ray) ray) { return min(ray_real(u_step) * ray_real(first_interval(ray)), ray.length); }
-
 // A sample at `at` as a block of one, which lies at p. `whole`: full intervals before its own.
 LatticeBlock lattice_point(IN(Ray) ray, IN(int) whole, IN(ray_real) at, OUT(Position) p) {
   LatticeBlock block;
@@ -372,6 +388,7 @@ LatticeBlock lattice_point(IN(Ray) ray, IN(int) whole, IN(ray_real) at, OUT(Posi
   block.fraction = p.fraction * AMRTEX_QUANTA;
   block.step = vec3r(0);
   block.first = whole;
+  block.phase = ray.phase;
   return block;
 }
 
@@ -418,7 +435,7 @@ void march_head(IN(Ray) ray, INOUT(Accumulation) a) {
 // Three nested loops (blocks, regions, samples): what is computed in an inner one is paid
 // by every lane of a SIMD group at every turn.
 void march_lattice(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
-  int whole = int(floor(ray.length / ray_real(u_step)));
+  int whole = full_intervals(ray);
   bool begins_later = AMRTEX_ISOVALUES != 0 || AMRTEX_CUT;
   int first = begins_later ? front.next & ~(AMRTEX_BLOCK - 1) : 0;
   if (first < whole) {
@@ -428,9 +445,9 @@ void march_lattice(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
       first += AMRTEX_BLOCK;
     } while (first < whole && !ray_stopped(a));
   }
-  bool rest = AMRTEX_PREINTEGRATED || ray_real(u_step) * ray_real(whole) < ray.length;
+  bool rest = AMRTEX_PREINTEGRATED || interval_begin(ray, whole) < ray.length;
   rest = rest && first_interval(ray) <= whole;  // else the head was all
-  if (rest && !ray_stopped(a)) march_lattice_part(a, ray, whole, ray_real(u_step) * ray_real(whole), ray.length);
+  if (rest && !ray_stopped(a)) march_lattice_part(a, ray, whole, interval_begin(ray, whole), ray.length);
 }
 
 // ---- adaptive: each region is divided into equal intervals of at most `step` of its own cells.
@@ -451,24 +468,37 @@ Position leave_region(IN(Ray) ray, IN(Region) r, IN(ray_real) t, IN(bvec3) throu
   return p;
 }
 
+// The interval of a region that is the i-th to be sampled (from 0.5 on): its middle and its length, in intervals. Where a ray's
+// intervals are moved the first and the last of `count` + 1 are parts of one.
+vec2r interval_at(IN(real) i, IN(real) count, IN(real) phase) {
+  if (AMRTEX_RAY_OFFSET == 0) return vec2r(i, 1);
+  real from = max(i - real(1.5) + phase, real(0));
+  real to = min(i - real(0.5) + phase, count);
+  return vec2r((from + to) * real(0.5), to - from);
+}
+
 // What march_adaptive_region does, with the eight values of one octant at a time.
 real march_adaptive_cell(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(vec3r) dq, IN(real) count, IN(real) interval,
-                         IN(ray_real) begin, IN(real) from) {
+                         IN(ray_real) begin, IN(real) from, IN(real) phase) {
   real i = from;
-  vec3r q = q0 + dq * i;
-  if (i < count) {
+  real last = AMRTEX_RAY_OFFSET != 0 ? count + real(1) : count;
+  vec2r part = interval_at(i, count, phase);
+  vec3r q = q0 + dq * part.x;
+  if (i < last) {
     do {
       ivec3 octant = stencil_octant(q);
       Stencil s;
       fetch_stencil(r, octant, s);
       bool same = true;
       do {
-        take_stencil_sample(a, r, s, octant, q, interval, begin + ray_real(interval * (i - real(0.5))), begin + ray_real(interval * i));
+        ray_real start = begin + ray_real(interval * (part.x - real(0.5) * part.y));
+        take_stencil_sample(a, r, s, octant, q, interval * part.y, start, begin + ray_real(interval * part.x));
         i += real(1);
-        q = q0 + dq * i;
+        part = interval_at(i, count, phase);
+        q = q0 + dq * part.x;
         same = all(equal(stencil_octant(q), octant));
-      } while (same && i < count && !ray_stopped(a));
-    } while (i < count && !ray_stopped(a));
+      } while (same && i < last && !ray_stopped(a));
+    } while (i < last && !ray_stopped(a));
   }
   return i - real(1);
 }
@@ -485,9 +515,9 @@ void march_points(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(vec3r) d
 }
 #endif
 
-// From interval middle `from` on; returns that across a surface, or of the last sample.
+// From interval middle `from` on; returns that across a surface, or of the last sample. `phase`: the ray's.
 real march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(vec3r) direction, IN(real) length, IN(ray_real) begin,
-                           IN(real) from) {
+                           IN(real) from, IN(real) phase) {
   real inverse_width = real(1) / real(r.width);
 #if AMRTEX_CPP || AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE
   if (AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE) {
@@ -512,15 +542,18 @@ real march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(
   }
 #endif
   if (AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_LEFT) q0 -= dq * real(0.5);
-  if (AMRTEX_CELL_REGIONS && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST) return march_adaptive_cell(a, r, q0, dq, count, interval, begin, from);
+  if (AMRTEX_CELL_REGIONS && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST) return march_adaptive_cell(a, r, q0, dq, count, interval, begin, from, phase);
   real i = from;
-  if (i < count) {
+  real last = AMRTEX_RAY_OFFSET != 0 ? count + real(1) : count;
+  if (i < last) {
     do {
-      vec3r q = q0 + dq * i;
+      vec2r part = interval_at(i, count, phase);
+      vec3r q = q0 + dq * part.x;
       if (AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_LEFT) q = inside_region(r, q);
-      take_sample(a, r, q, interval, begin + ray_real(interval * (i - real(0.5))), begin + ray_real(interval * i));
+      ray_real start = begin + ray_real(interval * (part.x - real(0.5) * part.y));
+      take_sample(a, r, q, interval * part.y, start, begin + ray_real(interval * part.x));
       i += real(1);
-    } while (i < count && !ray_stopped(a));
+    } while (i < last && !ray_stopped(a));
   }
   return i - real(1);
 }
@@ -562,7 +595,7 @@ void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
       p = leave_region(ray, r, t, bvec3(x, y, !x && !y));
       more = more && all(greaterThanEqual(p.cell, ivec3(0))) && all(lessThan(p.cell, u_domain_cells));
     } while (skipped && more);
-    if (!skipped && length > ray_real(0)) front.part = march_adaptive_region(a, r, vec3r(f), direction, real(length), front.t, part);
+    if (!skipped && length > ray_real(0)) front.part = march_adaptive_region(a, r, vec3r(f), direction, real(length), front.t, part, ray.phase);
     part = real(0.5);
   } while (more && !ray_stopped(a));
 }

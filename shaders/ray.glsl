@@ -18,6 +18,12 @@ UNIFORM(real, u_length_unit)         // world length of one unit of ray length
 #endif
 #endif
 DEFINE_INT(AMRTEX_CLIP_PLANES)
+#if !AMRTEX_CPP
+#ifndef AMRTEX_RAY_OFFSET
+#error AMRTEX_RAY_OFFSET must be defined: 1 where the intervals of each ray are moved by a number of its own, else 0
+#endif
+#endif
+DEFINE_INT(AMRTEX_RAY_OFFSET)
 
 STRUCT Ray {
   ray_vec3 entry;      // finest: where it enters the drawn box, or the eye inside it
@@ -25,6 +31,7 @@ STRUCT Ray {
   ray_real length;     // units, from entry to exit
   ray_real start;      // units, from where the camera sends it to the entry
   ray_real first;      // units, from the entry to where drawing begins: 0, or on the plane that cuts it there
+  real phase;          // intervals by which the ray's are moved; 0 without offsets
 };
 
 #if AMRTEX_CPP || AMRTEX_CLIP_PLANES > 0
@@ -44,6 +51,25 @@ bool clip_ray(INOUT(Ray) ray) {
 }
 #endif
 
+#if AMRTEX_CPP || AMRTEX_RAY_OFFSET
+UNIFORM(int, u_ray_seed)
+
+// Chris Wellons' lowbias32: each bit of v changes each of the result with nearly the same chance.
+uint hash_bits(IN(uint) v) {
+  uint h = (v ^ (v >> 16u)) * 0x7feb352du;
+  h = (h ^ (h >> 15u)) * 0x846ca68bu;
+  return h ^ (h >> 16u);
+}
+
+// In (0, 1), the same in every precision: 23 bits and a half.
+real ray_offset(IN(vec2r) pixel) {
+  uint h = hash_bits(uint(u_ray_seed));
+  h = hash_bits(h + uint(int(floor(pixel.x))));
+  h = hash_bits(h + uint(int(floor(pixel.y))));
+  return (real(h >> 9u) + real(0.5)) * real(1.1920928955078125e-7);
+}
+#endif
+
 // False when the pixel's ray misses the box. `pixel`: centre, from the lower left.
 bool camera_ray(IN(vec2r) pixel, OUT(Ray) ray) {
   ray_real u = ray_real(pixel.x) * ray_real(2) / ray_real(u_picture_size.x) - ray_real(1);
@@ -60,6 +86,10 @@ bool camera_ray(IN(vec2r) pixel, OUT(Ray) ray) {
   ray.length = ray_real(0);
   ray.start = ray_real(0);
   ray.first = ray_real(0);
+  ray.phase = real(0);
+#if AMRTEX_CPP || AMRTEX_RAY_OFFSET
+  if (AMRTEX_RAY_OFFSET != 0) ray.phase = ray_offset(pixel);
+#endif
   for (int axis = 0; axis < 3; ++axis) {
     ray_real o = origin[axis];
     ray_real d = ray.direction[axis];

@@ -33,6 +33,7 @@ Ray ray_to_lamp(IN(Position) p) {
   ray.length = ray_real(0);
   ray.start = ray_real(0);
   ray.first = ray_real(0);
+  ray.phase = real(0);
   if (largest > ray_real(0)) {
     ray_real in_largest = length(way / largest);
     ray.direction = way / largest / in_largest * u_cells_per_unit;
