@@ -28,7 +28,7 @@ constexpr auto kAvailableRenderKeys = std::to_array<std::string_view>(
     {"mode",      "sampling",     "step",        "width",       "height",      "skip",          "early_end",
      "consumer",  "slice_target", "integrator",  "isovalues",   "iso_opacity", "surface_color", "iso_tolerance",
      "shading",   "output",       "color_field", "point_light", "ambient",     "shadow_step",   "level_of_detail",
-     "max_level", "tolerance",    "prune",       "needs",       "clip_planes", "ray_offset"});
+     "max_level", "tolerance",    "prune",       "needs",       "clip_planes", "ray_offset",    "mirror"});
 constexpr std::array<std::string_view, 2> kNeeds = {"scene", "all"};
 constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
 
@@ -366,6 +366,7 @@ class Parser {
     else
       point.settings.isosurfaces = {};  // other modes have no use for it
     set_light(point.settings, choice);
+    if (const JsonNode* mirror = find(choice, "mirror")) located(*mirror, [&] { validate_mirror(point.settings); });
     if (const JsonNode* offset = find(choice, "ray_offset")) located(*offset, [&] { validate_ray_offset(point.settings); });
     if (point.settings.prune) require_prunable(point.settings, *find(choice, "prune"));
     return point;
@@ -477,6 +478,7 @@ class Parser {
     if (key == "sampling") s.sampling = located(node, [&] { return parse_sampling(node.text()); });
     if (key == "clip_planes") s.clip_planes = clip_planes(node);
     if (key == "ray_offset" && node.boolean()) s.ray_offset = 0;  // its seed is the experiment's
+    if (key == "mirror" && !node.json().is_null()) s.mirror = located(node, [&] { return parse_mirror(node.text()); });
     if (key == "step") s.step = node.positive_number();
     if (key == "width") s.width = static_cast<int>(node.integer(1, kMaxPictureEdge));
     if (key == "height") s.height = static_cast<int>(node.integer(1, kMaxPictureEdge));
@@ -713,6 +715,7 @@ Json render_json(const RenderPoint& render) {
   if (s.draws_surfaces()) json.update(surfaces_json(s.isosurfaces));
   if (s.point_light) json.update(light_json(*s.point_light));
   // only where they are in use, so that the names of other records stay
+  if (s.mirror) json["mirror"] = mirror_name(*s.mirror);
   if (s.ray_offset) json["seed"] = *s.ray_offset;
   if (!s.clip_planes.empty()) json["clip_planes"] = clip_planes_json(s.clip_planes);
   if (s.level_of_detail) json["level_of_detail"] = *s.level_of_detail;

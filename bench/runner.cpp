@@ -441,6 +441,7 @@ Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definit
     key["light"] = light_json(*scene.settings.point_light);
     key["light"].erase("shadow_step");  // sampling
   }
+  if (scene.settings.mirror) key["mirror"] = mirror_name(*scene.settings.mirror);
   if (!scene.settings.clip_planes.empty()) key["clip_planes"] = clip_planes_json(scene.settings.clip_planes);
   if (scene.region)
     for (const Vec3d& corner : *scene.region) key["region"].push_back({corner.x, corner.y, corner.z});

@@ -85,45 +85,54 @@ SurfaceScene::SurfaceScene(const Scene& s, const ReferenceField& f, const Refere
   for (const double value : settings.values) rgb.push_back(surface_color(scene, value));
 }
 
-void SurfacePainter::draw(ReferenceTracer& tracer, const IndexRay& ray, const Vec3d& direction, double start, double end,
-                          const LightIntegral::Arriving& lamp, double* pixel) {
-  if (scene_.settings.output == Output::color) return draw_color(tracer, ray, direction, end, lamp, pixel);
-  SurfaceFinder finder(scene_.settings.values, kJoint * end);
-  tracer.trace(ray, end, [&](const PieceFunction& f, double from, double to) {
-    const auto& crossings = finder.next(f, from, to);
-    if (crossings.empty()) return true;
-    const double s = crossings.front().s;
-    const double t = from + s * (to - from);
-    if (scene_.settings.output == Output::depth) {
-      *pixel = start + t;
-    } else {
-      const Vec3d normal = normal_at(point_of(tracer, ray, t, s));
-      for (int a = 0; a < 3; ++a) pixel[a] = normal[a];
-      pixel[3] = 1;
-    }
-    return false;
-  });
+void SurfacePainter::draw(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const std::optional<Mirror>& mirror,
+                          double start, const LightIntegral::Arriving& lamp, double* pixel) {
+  if (scene_.settings.output == Output::color) return draw_color(tracer, parts, lamp, pixel);
+  SurfaceFinder finder(scene_.settings.values, kJoint * (parts.back().start + parts.back().length));
+  bool found = false;
+  for (const RayPart& part : parts) {
+    if (found) return;
+    tracer.trace(part.ray, part.length, [&](const PieceFunction& f, double from, double to) {
+      const auto& crossings = finder.next(f, part.start + from, part.start + to);
+      found = !crossings.empty();
+      if (!found) return true;
+      const double s = crossings.front().s;
+      const double t = from + s * (to - from);
+      if (scene_.settings.output == Output::depth) {
+        *pixel = start + part.start + t;
+      } else {
+        Vec3d normal = normal_at(point_of(tracer, part.ray, t, s));
+        if (part.mirrored) normal[mirror->axis] = -normal[mirror->axis];
+        for (int a = 0; a < 3; ++a) pixel[a] = normal[a];
+        pixel[3] = 1;
+      }
+      return false;
+    });
+  }
 }
 
-void SurfacePainter::draw_color(ReferenceTracer& tracer, const IndexRay& ray, const Vec3d& direction, double end,
-                                const LightIntegral::Arriving& lamp, double* pixel) {
+void SurfacePainter::draw_color(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const LightIntegral::Arriving& lamp,
+                                double* pixel) {
   const Isosurfaces& surfaces = scene_.settings;
   LightIntegral light = scene_.volume != nullptr ? LightIntegral(*scene_.volume, lamp) : LightIntegral();
-  SurfaceFinder finder(surfaces.values, kJoint * end);
-  tracer.trace(ray, end, [&](const PieceFunction& f, double from, double to) {
-    double behind = 0;  // the last crossing
-    for (const Crossing& c : finder.next(f, from, to)) {
-      light.add(f, to - from, scene_.part, behind, c.s, from);
-      behind = c.s;
-      if (light.transmittance() < LightIntegral::kOpaque) return false;
-      const double t = from + c.s * (to - from);
-      const Vec3d p = point_of(tracer, ray, t, c.s);
-      const Vec3d rgb = color_at(p, c.surface, direction) * (lamp ? lamp(t) : 1.0);
-      light.add_surface(rgb, surfaces.opacity.empty() ? 1 : surfaces.opacity[c.surface]);
-    }
-    light.add(f, to - from, scene_.part, behind, 1, from);
-    return light.transmittance() >= LightIntegral::kOpaque;
-  });
+  SurfaceFinder finder(surfaces.values, kJoint * (parts.back().start + parts.back().length));
+  for (const RayPart& part : parts) {
+    if (light.transmittance() < LightIntegral::kOpaque) break;
+    tracer.trace(part.ray, part.length, [&](const PieceFunction& f, double from, double to) {
+      double behind = 0;  // the last crossing
+      for (const Crossing& c : finder.next(f, part.start + from, part.start + to)) {
+        light.add(f, to - from, scene_.part, behind, c.s, from);
+        behind = c.s;
+        if (light.transmittance() < LightIntegral::kOpaque) return false;
+        const double t = from + c.s * (to - from);
+        const Vec3d p = point_of(tracer, part.ray, t, c.s);
+        const Vec3d rgb = color_at(p, c.surface, part.direction) * (lamp ? lamp(t) : 1.0);
+        light.add_surface(rgb, surfaces.opacity.empty() ? 1 : surfaces.opacity[c.surface]);
+      }
+      light.add(f, to - from, scene_.part, behind, 1, from);
+      return light.transmittance() >= LightIntegral::kOpaque;
+    });
+  }
   for (int c = 0; c < 3; ++c) pixel[c] = light.color()[c];
   pixel[3] = 1 - light.transmittance();
 }

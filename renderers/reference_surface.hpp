@@ -6,6 +6,7 @@
 
 #include "renderers/ray_integral.hpp"
 #include "renderers/reference_field.hpp"
+#include "renderers/reference_parts.hpp"
 #include "renderers/reference_tracer.hpp"
 
 namespace amrtex {
@@ -60,13 +61,12 @@ class SurfacePainter {
  public:
   explicit SurfacePainter(const SurfaceScene& scene) : scene_(scene) {}
 
-  /// `start`: world distance from the eye to t = 0; `direction`: the ray's, world, unit length; `lamp`: see LightIntegral.
-  void draw(ReferenceTracer& tracer, const IndexRay& ray, const Vec3d& direction, double start, double end,
+  /// `start`: world distance from the eye to the first part; `lamp`: see LightIntegral.
+  void draw(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const std::optional<Mirror>& mirror, double start,
             const LightIntegral::Arriving& lamp, double* pixel);
 
  private:
-  void draw_color(ReferenceTracer& tracer, const IndexRay& ray, const Vec3d& direction, double end,
-                  const LightIntegral::Arriving& lamp, double* pixel);
+  void draw_color(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const LightIntegral::Arriving& lamp, double* pixel);
   Vec3d color_at(const Vec3d& p, std::size_t surface, const Vec3d& direction);
   Vec3d normal_at(const Vec3d& p);
 

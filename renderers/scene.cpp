@@ -370,6 +370,22 @@ void validate_ray_offset(const RenderSettings& s) {
                   integrator_name(s.integrator)));
 }
 
+std::string mirror_name(const Mirror& mirror) { return fmt::format("{}{}", mirror.upper ? '+' : '-', "xyz"[mirror.axis]); }
+
+Mirror parse_mirror(std::string_view name) {
+  for (const int axis : {0, 1, 2})
+    for (const bool upper : {false, true})
+      if (name == mirror_name({axis, upper})) return {axis, upper};
+  throw UsageError(fmt::format("unknown face '{}'; accepted are -x, +x, -y, +y, -z, +z", name));
+}
+
+void validate_mirror(const RenderSettings& s) {
+  if (!s.mirror) return;
+  if (s.point_light) throw UsageError("'mirror': rays to the lamp of 'point_light' do not see the image; accepted: one of both");
+  if (s.level_of_detail)
+    throw UsageError("'mirror': 'level_of_detail' knows the sizes of cells and not of their images; accepted: one of both");
+}
+
 ClipPlane in_finest_cells(const AmrHierarchy& h, const ClipPlane& plane) {
   const auto largest = [](const Vec3d& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); };
   const double size = largest(plane.normal);

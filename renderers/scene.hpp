@@ -136,6 +136,15 @@ inline constexpr std::size_t kMostClipPlanes = 8;
 /// The same plane in cells of the finest level, with a normal whose largest component is 1.
 ClipPlane in_finest_cells(const AmrHierarchy& hierarchy, const ClipPlane& plane);
 
+/// A face of what is drawn (the domain, or the sub-box) behind which its mirror image is drawn too.
+struct Mirror {
+  int axis = 0;        ///< 0 to 2
+  bool upper = false;  ///< the face at the axis's upper end
+};
+/// "-x", "+x", "-y", "+y", "-z", "+z"; the second throws a UsageError that names these.
+std::string mirror_name(const Mirror& mirror);
+Mirror parse_mirror(std::string_view name);
+
 struct RenderSettings {
   ConsumerKind consumer = ConsumerKind::raycast;
   SliceTarget slice_target = SliceTarget::rgba32f;  ///< consumers `slices` and `stencil_slices`
@@ -155,6 +164,7 @@ struct RenderSettings {
   std::vector<ClipPlane> clip_planes;     ///< at most kMostClipPlanes; drawn is what all of them keep, and a cut is no surface
   /// Seed of a random offset for each ray, by which its intervals are moved (Wald et al. 2020, section 4.2); off when absent.
   std::optional<std::uint32_t> ray_offset;
+  std::optional<Mirror> mirror;  ///< absent: the field alone
   /// Refined cells are drawn themselves where they are smaller on the picture, pixels; off when absent.
   std::optional<double> level_of_detail;
   std::optional<int> max_level;  ///< nothing finer is drawn where a cell of this level or a coarser one lies; off when absent
@@ -175,6 +185,8 @@ void validate_light(const RenderSettings& settings);
 void validate_clip_planes(const std::vector<ClipPlane>& planes);
 /// Throws UsageError where the integrator's samples are not the middles of intervals that an offset can move.
 void validate_ray_offset(const RenderSettings& settings);
+/// Throws UsageError where a mirror does not go with a lamp or level of detail.
+void validate_mirror(const RenderSettings& settings);
 /// Throws UsageError where the integrator does not go with the mode, the sampling or the tolerance.
 void validate_integrator(const RenderSettings& settings);
 

@@ -422,6 +422,8 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
                {"AMRTEX_ISOVALUES", s.draws_surfaces() ? static_cast<int>(s.isosurfaces.values.size()) : 0}};
   add_clip_planes(h, s, b);
   add_ray_offset(s, b);
+  validate_mirror(s);
+  b.defines.emplace_back("AMRTEX_MIRROR", s.mirror ? 2 * s.mirror->axis + (s.mirror->upper ? 2 : 1) : 0);
   add_light(h, s, b);
   if (s.draws_surfaces()) add_surfaces(scene, field, b);
   add_integrator(scene, field, extinction_unit(h, scene), b);

@@ -220,6 +220,8 @@ void draw_surface(IN(Ray) ray, INOUT(Accumulation) a) {
   Position p = make_position(ray.entry + ray.direction * c.t);
   if (AMRTEX_OUTPUT == AMRTEX_OUTPUT_DEPTH) a.surface = vec4r(real(ray.start + c.t) * u_length_unit, real(0), real(0), real(1));
   if (AMRTEX_OUTPUT == AMRTEX_OUTPUT_NORMAL) a.surface = vec4r(surface_normal(p, u_isovalues[k]), real(1));
+  if (AMRTEX_OUTPUT == AMRTEX_OUTPUT_NORMAL && AMRTEX_MIRROR != 0 && ray.mirrored)
+    a.surface[AMRTEX_MIRROR_AXIS] = -a.surface[AMRTEX_MIRROR_AXIS];
   if (AMRTEX_OUTPUT != AMRTEX_OUTPUT_COLOR) return;
   // the part of an interval between its end and the surface is moved to the other side of it
   real shift = real(c.t - a.between);
@@ -234,6 +236,15 @@ void draw_surface(IN(Ray) ray, INOUT(Accumulation) a) {
   composite_surface(ray, a, p, k, lit.x);
   if (AMRTEX_DRAWS_VOLUME) shift_volume(a, value, -shift, lit.y);
 }
+
+#if AMRTEX_CPP || AMRTEX_MIRROR
+// A sample on the mirror, of no length: a surface between the last sample before it and the first behind it is not lost.
+void note_mirror(IN(Ray) ray, INOUT(Accumulation) a) {
+  FieldSample s;
+  bool has_value = sample_field(make_position(ray.entry + ray.direction * ray.length), s);
+  note_side(a, !has_value, s.value, ray.length, ray.length);
+}
+#endif
 
 // An opaque surface ends a ray; pictures of depth and normals end at the first.
 bool surfaces_ended(IN(Accumulation) a) {

@@ -608,10 +608,17 @@ void march(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
 #if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
 // The loop over samples stops at each surface, so that none of what a surface costs (bisection,
 // gradient) is inside of it.
-void march_surfaces(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
+void march_surfaces(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front, IN(bool) goes_on) {
   bool more = true;
+  bool at_mirror = false;
   do {
-    march(ray, a, front);
+    if (!at_mirror) march(ray, a, front);
+#if AMRTEX_CPP || AMRTEX_MIRROR
+    if (AMRTEX_MIRROR != 0 && goes_on && !a.crossing && !ray_ended(a)) {
+      at_mirror = true;
+      note_mirror(ray, a);
+    }
+#endif
     more = a.crossing;
     if (a.crossing) draw_surface(ray, a);
     more = more && !surfaces_ended(a) && !ray_ended(a);
@@ -631,8 +638,8 @@ vec4r volume_picture(IN(Accumulation) a) {
   return vec4r(a.maximum < real(-3.4028235e38) ? real(0) : a.maximum, real(0), real(0), real(1));
 }
 
-// The picture's value for one ray.
-vec4r march_ray(IN(Ray) ray, INOUT(Accumulation) a) {
+// A ray, or the part of one before or behind the mirror.
+void march_part(IN(Ray) ray, INOUT(Accumulation) a, IN(bool) goes_on) {
   Front front;
   front.next = first_interval(ray);
   front.t = ray.first;
@@ -641,10 +648,38 @@ vec4r march_ray(IN(Ray) ray, INOUT(Accumulation) a) {
   if (AMRTEX_CUT) march_head(ray, a);
 #if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
   if (AMRTEX_ISOVALUES != 0) {
-    if (!AMRTEX_CUT || !ray_ended(a)) march_surfaces(ray, a, front);
-    return surface_picture(a);
+    if (!AMRTEX_CUT || !ray_ended(a)) march_surfaces(ray, a, front, goes_on);
+    return;
   }
 #endif
   if (!AMRTEX_CUT || !ray_ended(a)) march(ray, a, front);
+}
+
+// May what lies behind be left out?
+bool picture_ended(IN(Accumulation) a) {
+#if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
+  if (AMRTEX_ISOVALUES != 0 && surfaces_ended(a)) return true;
+#endif
+  return ray_ended(a);
+}
+
+// The picture's value for one ray.
+vec4r march_ray(IN(Ray) ray, INOUT(Accumulation) a) {
+#if AMRTEX_CPP || AMRTEX_MIRROR
+  for (int i = 0; i < (AMRTEX_MIRROR != 0 ? 2 : 1); ++i) {
+    Ray part = ray;
+    bool goes_on = false;
+    bool drawn = AMRTEX_MIRROR == 0 || (mirrored_part(ray, i, part, goes_on) && !picture_ended(a));
+    a.before = ray_real(0);  // on the mirror, where the part before noted its side
+    a.end_state = AMRTEX_END_NONE;
+    a.end_level = -1;
+    if (drawn) march_part(part, a, goes_on);
+  }
+#else
+  march_part(ray, a, false);
+#endif
+#if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
+  if (AMRTEX_ISOVALUES != 0) return surface_picture(a);
+#endif
   return volume_picture(a);
 }

@@ -24,6 +24,14 @@ DEFINE_INT(AMRTEX_CLIP_PLANES)
 #endif
 #endif
 DEFINE_INT(AMRTEX_RAY_OFFSET)
+#if !AMRTEX_CPP
+#ifndef AMRTEX_MIRROR
+#error AMRTEX_MIRROR must be defined: 2 axis + 1, or + 2 for the upper face, where the drawn box is mirrored; 0 where it is not
+#endif
+#endif
+DEFINE_INT(AMRTEX_MIRROR)
+#define AMRTEX_MIRROR_AXIS ((AMRTEX_MIRROR - 1) / 2)
+#define AMRTEX_MIRROR_UPPER (AMRTEX_MIRROR % 2 == 0)
 
 STRUCT Ray {
   ray_vec3 entry;      // finest: where it enters the drawn box, or the eye inside it
@@ -31,6 +39,7 @@ STRUCT Ray {
   ray_real length;     // units, from entry to exit
   ray_real start;      // units, from where the camera sends it to the entry
   ray_real first;      // units, from the entry to where drawing begins: 0, or on the plane that cuts it there
+  bool mirrored;       // is it the way through the mirror image, as one through the field?
   real phase;          // intervals by which the ray's are moved; 0 without offsets
 };
 
@@ -87,23 +96,31 @@ bool camera_ray(IN(vec2r) pixel, OUT(Ray) ray) {
   ray.start = ray_real(0);
   ray.first = ray_real(0);
   ray.phase = real(0);
+  ray.mirrored = false;
 #if AMRTEX_CPP || AMRTEX_RAY_OFFSET
   if (AMRTEX_RAY_OFFSET != 0) ray.phase = ray_offset(pixel);
 #endif
+  ray_vec3 lower = u_draw_lower;
+  ray_vec3 upper = u_draw_upper;
+  if (AMRTEX_MIRROR != 0) {  // and its image
+    ray_real size = upper[AMRTEX_MIRROR_AXIS] - lower[AMRTEX_MIRROR_AXIS];
+    if (AMRTEX_MIRROR_UPPER) upper[AMRTEX_MIRROR_AXIS] += size;
+    else lower[AMRTEX_MIRROR_AXIS] -= size;
+  }
   for (int axis = 0; axis < 3; ++axis) {
     ray_real o = origin[axis];
     ray_real d = ray.direction[axis];
     if (d == ray_real(0)) {  // parallel to these faces: inside all the way, or never
-      if (o < u_draw_lower[axis] || o > u_draw_upper[axis]) return false;
+      if (o < lower[axis] || o > upper[axis]) return false;
     } else {
-      ray_real t0 = (u_draw_lower[axis] - o) / d;
-      ray_real t1 = (u_draw_upper[axis] - o) / d;
+      ray_real t0 = (lower[axis] - o) / d;
+      ray_real t1 = (upper[axis] - o) / d;
       enter = max(enter, min(t0, t1));
       leave = min(leave, max(t0, t1));
     }
   }
   if (!(leave > enter)) return false;
-  ray.entry = clamp(origin + ray.direction * enter, u_draw_lower, u_draw_upper);
+  ray.entry = clamp(origin + ray.direction * enter, lower, upper);
   ray.length = leave - enter;
   ray.start = enter;
 #if AMRTEX_CPP || AMRTEX_CLIP_PLANES > 0
@@ -122,3 +139,35 @@ Position make_position(IN(ray_vec3) p) {
   position.fraction = clamp(vec3r(p - whole), vec3r(0), vec3r(AMRTEX_BELOW_ONE));
   return position;
 }
+
+#if AMRTEX_CPP || AMRTEX_MIRROR
+// The first (0) or second (1) part of a ray, as a ray through the drawn box itself: up to where it goes through the mirror, or from
+// there on; what lies in the image is reflected. False where nothing of it is drawn. `goes_on`: does another part follow?
+bool mirrored_part(IN(Ray) ray, IN(int) number, OUT(Ray) part, OUT(bool) goes_on) {
+  ray_real plane = AMRTEX_MIRROR_UPPER ? u_draw_upper[AMRTEX_MIRROR_AXIS] : u_draw_lower[AMRTEX_MIRROR_AXIS];
+  ray_real outward = ray_real(AMRTEX_MIRROR_UPPER ? 1 : -1);
+  ray_real height = (ray.entry[AMRTEX_MIRROR_AXIS] - plane) * outward;
+  ray_real rise = ray.direction[AMRTEX_MIRROR_AXIS] * outward;
+  ray_real fold = rise == ray_real(0) ? ray.length : -height / rise;
+  bool folds = fold > ray_real(0) && fold < ray.length;
+  bool begins_in_image = height > ray_real(0) || (height == ray_real(0) && rise > ray_real(0));
+  part = ray;
+  goes_on = folds && number == 0;
+  if (number == 1 && !folds) return false;
+  ray_real begin = number == 1 ? fold : ray_real(0);
+  if (number == 1) {
+    part.entry = ray.entry + ray.direction * fold;
+    part.entry[AMRTEX_MIRROR_AXIS] = plane;
+  }
+  part.length = (goes_on ? fold : ray.length) - begin;
+  part.start = ray.start + begin;
+  part.first = max(ray.first - begin, ray_real(0));
+  part.mirrored = begins_in_image != (number == 1);
+  if (part.mirrored) {
+    part.entry[AMRTEX_MIRROR_AXIS] = ray_real(2) * plane - part.entry[AMRTEX_MIRROR_AXIS];
+    part.direction[AMRTEX_MIRROR_AXIS] = -ray.direction[AMRTEX_MIRROR_AXIS];
+  }
+  part.entry = clamp(part.entry, u_draw_lower, u_draw_upper);
+  return part.length > part.first;
+}
+#endif

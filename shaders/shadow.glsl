@@ -34,6 +34,7 @@ Ray ray_to_lamp(IN(Position) p) {
   ray.start = ray_real(0);
   ray.first = ray_real(0);
   ray.phase = real(0);
+  ray.mirrored = false;
   if (largest > ray_real(0)) {
     ray_real in_largest = length(way / largest);
     ray.direction = way / largest / in_largest * u_cells_per_unit;
