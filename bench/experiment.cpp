@@ -25,10 +25,10 @@ constexpr int kMostLevel = 63;
 constexpr double kAnyNumber = std::numeric_limits<double>::max();
 
 constexpr auto kAvailableRenderKeys = std::to_array<std::string_view>(
-    {"mode",      "sampling",     "step",        "width",       "height",      "skip",          "early_end",
-     "consumer",  "slice_target", "integrator",  "isovalues",   "iso_opacity", "surface_color", "iso_tolerance",
-     "shading",   "output",       "color_field", "point_light", "ambient",     "shadow_step",   "level_of_detail",
-     "max_level", "tolerance",    "prune",       "needs",       "clip_planes", "ray_offset",    "mirror"});
+    {"mode",         "sampling",    "step",       "width",       "height",           "skip",          "early_end", "consumer",
+     "slice_target", "integrator",  "isovalues",  "iso_opacity", "surface_color",    "iso_tolerance", "shading",   "output",
+     "color_field",  "point_light", "ambient",    "shadow_step", "level_of_detail",  "max_level",     "tolerance", "prune",
+     "needs",        "clip_planes", "ray_offset", "mirror",      "ambient_occlusion"});
 constexpr std::array<std::string_view, 2> kNeeds = {"scene", "all"};
 constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
 
@@ -442,6 +442,15 @@ class Parser {
     return points;
   }
 
+  static AmbientOcclusion occlusion(const JsonNode& node) {
+    node.accept_keys(Names{"rays", "radius", "seed"});
+    AmbientOcclusion around;
+    around.radius = node.require("radius").positive_number();
+    if (const auto rays = node.find("rays")) around.rays = static_cast<int>(rays->integer(1, kMostOcclusionRays));
+    if (const auto seed = node.find("seed")) around.seed = static_cast<std::uint32_t>(seed->integer(0, UINT32_MAX));
+    return around;
+  }
+
   static void set_surfaces(Isosurfaces& iso, const std::string& key, const JsonNode& node) {
     if (key == "isovalues") iso.values = numbers(node);
     if (key == "iso_opacity") iso.opacity = numbers(node);
@@ -449,6 +458,7 @@ class Parser {
     if (key == "iso_tolerance") iso.tolerance = node.positive_number();
     if (key == "shading") iso.shading = located(node, [&] { return parse_shading(node.text()); });
     if (key == "output") iso.output = located(node, [&] { return parse_output(node.text()); });
+    if (key == "ambient_occlusion" && !node.json().is_null()) iso.ambient_occlusion = occlusion(node);
     if (key == "color_field" && !node.json().is_null()) iso.color_field = node.text();
   }
 
@@ -677,6 +687,8 @@ Json surfaces_json(const Isosurfaces& iso) {
   json["iso_tolerance"] = iso.tolerance;
   json["shading"] = shading_name(iso.shading);
   json["output"] = output_name(iso.output);
+  if (const auto& around = iso.ambient_occlusion)
+    json["ambient_occlusion"] = {{"rays", around->rays}, {"radius", around->radius}, {"seed", around->seed}};
   return json;
 }
 

@@ -433,6 +433,8 @@ Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definit
   key["view"] = to_json(scene.view);
   if (scene.settings.draws_surfaces()) {
     key["isosurfaces"] = surfaces_json(scene.settings.isosurfaces);
+    if (const auto& around = scene.settings.isosurfaces.ambient_occlusion)
+      key["isosurfaces"]["ambient_occlusion"] = {{"radius", around->radius}};  // the rest is sampling
     for (const int field : more_fields(hierarchy, scene)) key["color_field"] = hierarchy.content_hash(field);
   }
   if (scene.settings.draws_volume() || scene.settings.draws_surfaces())

@@ -296,6 +296,11 @@ Picture HierarchyReference::draw(const Scene& scene, double step, const Analytic
   const Drawing drawing = make_drawing(h, scene, step, table ? &*table : nullptr, truth);
   std::optional<SurfaceScene> surfaces;
   if (scene.settings.draws_surfaces()) surfaces.emplace(scene, data_->field, color_field, drawing.table, drawing.part);
+  if (surfaces) {
+    surfaces->lower = drawing.lower;
+    surfaces->upper = drawing.upper;
+    surfaces->planes = drawing.planes;
+  }
   std::optional<LampScene> lamp;
   if (scene.settings.point_light)
     lamp.emplace(scene, data_->field, extinction_scale(h, scene.transfer_function), drawing.lower, drawing.upper, drawing.part);

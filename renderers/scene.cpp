@@ -324,6 +324,17 @@ void validate(const Isosurfaces& iso) {
   for (const auto& point : iso.color) check_color(point.rgb, "isosurfaces: 'surface_color'");
   if (!(iso.tolerance > 0 && iso.tolerance <= 1))
     throw UsageError(fmt::format("isosurfaces: 'iso_tolerance' is {}; it must lie in (0, 1] cell widths", iso.tolerance));
+  if (!iso.ambient_occlusion) return;
+  const AmbientOcclusion& around = *iso.ambient_occlusion;
+  if (around.rays < 1 || around.rays > kMostOcclusionRays)
+    throw UsageError(
+        fmt::format("isosurfaces: 'ambient_occlusion' has {} rays; it accepts 1 to {}", around.rays, kMostOcclusionRays));
+  if (!(around.radius > 0) || !std::isfinite(around.radius))
+    throw UsageError(
+        fmt::format("isosurfaces: 'ambient_occlusion' has the radius {}; it must be above 0, in world units", around.radius));
+  if (iso.output != Output::color)
+    throw UsageError(fmt::format("isosurfaces: 'ambient_occlusion' darkens colours: it accepts the output color, not {}",
+                                 output_name(iso.output)));
 }
 
 void validate_light(const RenderSettings& s) {
@@ -382,6 +393,8 @@ Mirror parse_mirror(std::string_view name) {
 void validate_mirror(const RenderSettings& s) {
   if (!s.mirror) return;
   if (s.point_light) throw UsageError("'mirror': rays to the lamp of 'point_light' do not see the image; accepted: one of both");
+  if (s.draws_surfaces() && s.isosurfaces.ambient_occlusion)
+    throw UsageError("'mirror': rays of 'ambient_occlusion' do not see the image; accepted: one of both");
   if (s.level_of_detail)
     throw UsageError("'mirror': 'level_of_detail' knows the sizes of cells and not of their images; accepted: one of both");
 }

@@ -104,6 +104,15 @@ Shading parse_shading(std::string_view name);
 
 inline constexpr std::size_t kMostIsovalues = 16;
 
+/// Light that reaches a surface from around it: the share of `rays` from a hit, cosine-weighted over the hemisphere on the eye's
+/// side, that meet no isosurface within `radius`. A surface's colour is multiplied by it.
+struct AmbientOcclusion {
+  int rays = 16;           ///< 1 to kMostOcclusionRays
+  double radius = 0;       ///< world, above 0
+  std::uint32_t seed = 0;  ///< of a turn of the rays around the normal, one a pixel
+};
+inline constexpr int kMostOcclusionRays = 1024;
+
 /// Isosurfaces of the drawn field (modes `iso` and `dvr_iso`).
 struct Isosurfaces {
   std::vector<double> values;   ///< isovalues in field units, ascending; 1 to kMostIsovalues
@@ -114,6 +123,7 @@ struct Isosurfaces {
   double tolerance = 1.0 / 1024;  ///< bound on a hit's position along the ray, cell widths as `step`
   Shading shading = Shading::gradient;
   Output output = Output::color;
+  std::optional<AmbientOcclusion> ambient_occlusion;  ///< absent: surfaces take no light from one another; output `color`
 };
 
 /// Throws UsageError (no isovalue, too many, not ascending, opacities that do not fit, ...).

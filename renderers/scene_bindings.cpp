@@ -258,6 +258,17 @@ void add_ray_offset(const RenderSettings& s, SceneBindings& b) {
   if (s.ray_offset) b.uniforms.push_back({"u_ray_seed", std::vector<int>{static_cast<int>(*s.ray_offset)}});
 }
 
+void add_occlusion(const AmrHierarchy& h, const RenderSettings& s, SceneBindings& b) {
+  const auto& around = s.isosurfaces.ambient_occlusion;
+  const bool on = s.draws_surfaces() && around;
+  b.defines.emplace_back("AMRTEX_OCCLUSION", on ? 1 : 0);
+  if (!on) return;
+  constexpr double kFar = 1e30;  // farther than any domain, and a float
+  b.uniforms.push_back({"u_occlusion_rays", std::vector<int>{around->rays}});
+  b.uniforms.push_back({"u_occlusion_radius", std::vector<double>{std::min(around->radius / smallest_edge(h), kFar)}});
+  b.uniforms.push_back({"u_occlusion_seed", std::vector<int>{static_cast<int>(around->seed)}});
+}
+
 void require_detail(const EncodedField& field, const RenderSettings& s) {
   const auto& defines = field.shader.defines;
   const auto it = std::find(defines.begin(), defines.end(), std::pair<std::string, int>("AMRTEX_LEVEL_OF_DETAIL", 1));
@@ -423,6 +434,7 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
   add_clip_planes(h, s, b);
   add_ray_offset(s, b);
   validate_mirror(s);
+  add_occlusion(h, s, b);
   b.defines.emplace_back("AMRTEX_MIRROR", s.mirror ? 2 * s.mirror->axis + (s.mirror->upper ? 2 : 1) : 0);
   add_light(h, s, b);
   if (s.draws_surfaces()) add_surfaces(scene, field, b);
@@ -438,7 +450,8 @@ SceneNeeds scene_needs(const Scene& scene, Filter filter, Filtering filtering) {
   needs.draw_boxes = scene.settings.consumer != ConsumerKind::raycast;
   needs.everything = scene.settings.everything;
   needs.value_ranges = scene.settings.skip || needs.everything;
-  const bool lit = scene.settings.draws_surfaces() && scene.settings.isosurfaces.shading == Shading::gradient;
+  const bool lit = scene.settings.draws_surfaces() &&
+                   (scene.settings.isosurfaces.shading == Shading::gradient || scene.settings.isosurfaces.ambient_occlusion);
   needs.gradients = lit || needs.everything;
   if (!scene.settings.prune) return needs;
   validate_prune(scene.settings);

@@ -42,6 +42,7 @@ bool region_invisible(IN(Accumulation) a, IN(Region) r) {
 #if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
   if (AMRTEX_ISOVALUES != 0 && !on_one_side(a, r.value_range)) return false;
 #endif
+  if (AMRTEX_OCCLUSION != 0 && a.probing) return true;
   if (AMRTEX_DRAWS_VOLUME) return !transfer_visible(r.value_range);
   if (AMRTEX_MODE == AMRTEX_MODE_ISO) return true;
   if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION) return r.value_range.x == real(0) && r.value_range.y == real(0);
@@ -57,6 +58,7 @@ void take_sample(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q, IN(real) leng
   if (AMRTEX_ISOVALUES != 0) {
     note_side(a, missing, value, begin, at);
     if (a.crossing) return;  // the surface comes first; this sample is taken again after it
+    if (AMRTEX_OCCLUSION != 0 && a.probing) return;
   }
 #endif
 #if AMRTEX_CPP || AMRTEX_PREINTEGRATED
@@ -90,6 +92,7 @@ void take_constant_samples(INOUT(Accumulation) a, IN(Region) r, IN(real) count, 
     note_side(a, missing, value, begin, begin + way * ray_real(0.5));
     if (a.crossing) return;
     a.before = begin + way * ray_real(count - real(0.5));
+    if (AMRTEX_OCCLUSION != 0 && a.probing) return;
   }
 #endif
   if (missing) return;
@@ -113,7 +116,7 @@ void take_stencil_sample(INOUT(Accumulation) a, IN(Region) r, IN(Stencil) s, IN(
 #if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
   if (AMRTEX_ISOVALUES != 0) {
     note_side(a, false, value, begin, at);
-    if (a.crossing) return;
+    if (a.crossing || (AMRTEX_OCCLUSION != 0 && a.probing)) return;
   }
 #endif
 #if AMRTEX_CPP || AMRTEX_SHADOWS
@@ -604,6 +607,24 @@ void march(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
   if (AMRTEX_LATTICE != 0) march_lattice(ray, a, front);
   else march_adaptive(ray, a, front);
 }
+
+#if AMRTEX_CPP || AMRTEX_OCCLUSION
+// Does a ray that begins on a side (-1: on none) meet a surface? Sampled adaptively, as all secondary rays.
+bool meets_surface(INOUT(Accumulation) a, IN(Ray) ray, IN(int) side) {
+  Accumulation probe = empty_accumulation();
+  probe.probing = true;
+  probe.below = side;
+  probe.counted = a.counted;
+  Front front;
+  front.next = 0;
+  front.t = ray_real(0);
+  front.p = make_position(ray.entry);
+  front.part = real(0.5);
+  if (ray.length > ray_real(0)) march_adaptive(ray, probe, front);
+  a.counted = probe.counted;
+  return probe.crossing;
+}
+#endif
 
 #if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
 // The loop over samples stops at each surface, so that none of what a surface costs (bisection,

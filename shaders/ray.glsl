@@ -30,6 +30,12 @@ DEFINE_INT(AMRTEX_RAY_OFFSET)
 #endif
 #endif
 DEFINE_INT(AMRTEX_MIRROR)
+#if !AMRTEX_CPP
+#ifndef AMRTEX_OCCLUSION
+#error AMRTEX_OCCLUSION must be defined: 1 where isosurfaces take light from one another, else 0
+#endif
+#endif
+DEFINE_INT(AMRTEX_OCCLUSION)
 #define AMRTEX_MIRROR_AXIS ((AMRTEX_MIRROR - 1) / 2)
 #define AMRTEX_MIRROR_UPPER (AMRTEX_MIRROR % 2 == 0)
 
@@ -40,6 +46,7 @@ STRUCT Ray {
   ray_real start;      // units, from where the camera sends it to the entry
   ray_real first;      // units, from the entry to where drawing begins: 0, or on the plane that cuts it there
   bool mirrored;       // is it the way through the mirror image, as one through the field?
+  real turn;           // radians by which what is around a hit is turned; of occlusion alone
   real phase;          // intervals by which the ray's are moved; 0 without offsets
 };
 
@@ -60,8 +67,9 @@ bool clip_ray(INOUT(Ray) ray) {
 }
 #endif
 
-#if AMRTEX_CPP || AMRTEX_RAY_OFFSET
+#if AMRTEX_CPP || AMRTEX_RAY_OFFSET || AMRTEX_OCCLUSION
 UNIFORM(int, u_ray_seed)
+UNIFORM(int, u_occlusion_seed)
 
 // Chris Wellons' lowbias32: each bit of v changes each of the result with nearly the same chance.
 uint hash_bits(IN(uint) v) {
@@ -71,8 +79,8 @@ uint hash_bits(IN(uint) v) {
 }
 
 // In (0, 1), the same in every precision: 23 bits and a half.
-real ray_offset(IN(vec2r) pixel) {
-  uint h = hash_bits(uint(u_ray_seed));
+real pixel_random(IN(vec2r) pixel, IN(int) seed) {
+  uint h = hash_bits(uint(seed));
   h = hash_bits(h + uint(int(floor(pixel.x))));
   h = hash_bits(h + uint(int(floor(pixel.y))));
   return (real(h >> 9u) + real(0.5)) * real(1.1920928955078125e-7);
@@ -98,7 +106,11 @@ bool camera_ray(IN(vec2r) pixel, OUT(Ray) ray) {
   ray.phase = real(0);
   ray.mirrored = false;
 #if AMRTEX_CPP || AMRTEX_RAY_OFFSET
-  if (AMRTEX_RAY_OFFSET != 0) ray.phase = ray_offset(pixel);
+  if (AMRTEX_RAY_OFFSET != 0) ray.phase = pixel_random(pixel, u_ray_seed);
+#endif
+  ray.turn = real(0);
+#if AMRTEX_CPP || AMRTEX_OCCLUSION
+  if (AMRTEX_OCCLUSION != 0) ray.turn = pixel_random(pixel, u_occlusion_seed) * real(6.28318530717958648);
 #endif
   ray_vec3 lower = u_draw_lower;
   ray_vec3 upper = u_draw_upper;
@@ -127,6 +139,33 @@ bool camera_ray(IN(vec2r) pixel, OUT(Ray) ray) {
   if (AMRTEX_CLIP_PLANES > 0) return clip_ray(ray);
 #endif
   return true;
+}
+
+// A ray from a place inside of what is drawn ends at the latest where that ends.
+void end_where_drawn(INOUT(Ray) ray) {
+  for (int axis = 0; axis < 3; ++axis) {
+    ray_real d = ray.direction[axis];
+    if (d > ray_real(0)) ray.length = min(ray.length, (u_draw_upper[axis] - ray.entry[axis]) / d);
+    if (d < ray_real(0)) ray.length = min(ray.length, (u_draw_lower[axis] - ray.entry[axis]) / d);
+  }
+#if AMRTEX_CPP || AMRTEX_CLIP_PLANES > 0
+  if (AMRTEX_CLIP_PLANES > 0 && !clip_ray(ray)) ray.length = ray_real(0);
+#endif
+  ray.first = ray_real(0);  // it begins where something is drawn, whatever rounding says
+}
+
+// From `entry` (finest), with no length yet.
+Ray secondary_ray(IN(ray_vec3) entry) {
+  Ray ray;
+  ray.entry = entry;
+  ray.direction = ray_vec3(1, 0, 0);
+  ray.length = ray_real(0);
+  ray.start = ray_real(0);
+  ray.first = ray_real(0);
+  ray.mirrored = false;
+  ray.turn = real(0);
+  ray.phase = real(0.5);
+  return ray;
 }
 
 // Splits a point in finest space; faces belong to the upper cell, the domain's last face

@@ -99,11 +99,15 @@ TEST(Mirror, ShowsWhatDataOfBothHalvesShow) {
   for (const Filter filter : {Filter::nearest, Filter::linear_lod, Filter::linear_vertex})
     for (const Mode mode : kModes) {
       SCOPED_TRACE(fmt::format("{} {}", filter_name(filter), mode_name(mode)));
-      const Picture mirrored =
-          HierarchyReference(half, 0, {filter}).render(mirror_scene(mode, Sampling::adaptive, Mirror{0, true}, view), 0.5);
-      const Picture expected =
-          HierarchyReference(whole, 0, {filter}).render(mirror_scene(mode, Sampling::adaptive, std::nullopt, view), 0.5);
-      EXPECT_LE(difference(mirrored, expected), 1e-6 * std::max(1.0, largest(expected)));
+      const auto drawn = [&](const AmrHierarchy& h, const std::optional<Mirror>& mirror) {
+        Scene scene = mirror_scene(mode, Sampling::adaptive, mirror, view);
+        scene.settings.isosurfaces.shading = Shading::none;  // a gradient within a cell of the mirror is one-sided
+        return HierarchyReference(h, 0, {filter}).render(scene, 0.5);
+      };
+      const Picture mirrored = drawn(half, Mirror{0, true});
+      const Picture expected = drawn(whole, std::nullopt);
+      // pieces end on the mirror, and parts of the integral with them
+      EXPECT_LE(difference(mirrored, expected), 1e-5 * std::max(1.0, largest(expected)));
       EXPECT_GT(largest(expected), 0.1);
     }
 }
