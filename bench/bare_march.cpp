@@ -55,6 +55,7 @@ class BareMarch {
     ShaderKey key;
     key.entry = "bare_march.frag";
     key.define("AMRTEX_RAY_DOUBLE", 0);
+    for (const char* off : {"AMRTEX_CLIP_PLANES", "AMRTEX_RAY_OFFSET", "AMRTEX_MIRROR", "AMRTEX_OCCLUSION"}) key.define(off, 0);
     return key;
   }
 

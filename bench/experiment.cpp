@@ -25,19 +25,18 @@ constexpr int kMostLevel = 63;
 constexpr double kAnyNumber = std::numeric_limits<double>::max();
 
 constexpr auto kAvailableRenderKeys = std::to_array<std::string_view>(
-    {"mode",      "sampling",     "step",        "width",       "height",      "skip",          "early_end",
-     "consumer",  "slice_target", "integrator",  "isovalues",   "iso_opacity", "surface_color", "iso_tolerance",
-     "shading",   "output",       "color_field", "point_light", "ambient",     "shadow_step",   "level_of_detail",
-     "max_level", "tolerance",    "prune",       "needs"});
-constexpr std::array<std::string_view, 1> kLaterRenderKeys = {"clip_planes"};
+    {"mode",         "sampling",    "step",       "width",       "height",           "skip",          "early_end", "consumer",
+     "slice_target", "integrator",  "isovalues",  "iso_opacity", "surface_color",    "iso_tolerance", "shading",   "output",
+     "color_field",  "point_light", "ambient",    "shadow_step", "level_of_detail",  "max_level",     "tolerance", "prune",
+     "needs",        "clip_planes", "ray_offset", "mirror",      "ambient_occlusion"});
 constexpr std::array<std::string_view, 2> kNeeds = {"scene", "all"};
 constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
 
 /// How many lists deep one value of this key is; what lies deeper is an axis.
 int value_depth(std::string_view key) {
-  if (key == "extinction" || key == "color" || key == "surface_color") return 2;
-  constexpr std::array<std::string_view, 11> lists = {"point_light", "more_fields", "eye",  "at",    "up",         "isovalues",
-                                                      "iso_opacity", "clip_planes", "root", "ratio", "skip_levels"};
+  if (key == "extinction" || key == "color" || key == "surface_color" || key == "clip_planes") return 2;
+  constexpr std::array<std::string_view, 10> lists = {"point_light", "more_fields", "eye",  "at",    "up",
+                                                      "isovalues",   "iso_opacity", "root", "ratio", "skip_levels"};
   return std::find(lists.begin(), lists.end(), key) != lists.end() ? 1 : 0;
 }
 
@@ -81,6 +80,7 @@ Json unnamed_render_json(const RenderPoint& render) {
   json.erase("transfer_function_name");
   if (!render.settings.prune) json.erase("prune");  // older records keep their names
   if (!render.settings.everything) json.erase("needs");
+  if (!render.settings.ray_offset) json.erase("ray_offset");
   return json;
 }
 
@@ -350,16 +350,10 @@ class Parser {
     if (!node) return {RenderPoint{}};
     std::vector<RenderPoint> points;
     for (const JsonNode& render : node->items()) {
-      for (const auto& [key, value] : render.members()) refuse_later(key, value);
       render.accept_keys(kAvailableRenderKeys);
       for (const Choice& choice : combinations(render)) points.push_back(parse_setting(choice));
     }
     return points;
-  }
-
-  static void refuse_later(const std::string& key, const JsonNode& node) {
-    if (std::find(kLaterRenderKeys.begin(), kLaterRenderKeys.end(), key) != kLaterRenderKeys.end())
-      node.fail(fmt::format("not available in this version; available: {}", fmt::join(kAvailableRenderKeys, ", ")));
   }
 
   static RenderPoint parse_setting(const Choice& choice) {
@@ -373,6 +367,8 @@ class Parser {
     else
       point.settings.isosurfaces = {};  // other modes have no use for it
     set_light(point.settings, choice);
+    if (const JsonNode* mirror = find(choice, "mirror")) located(*mirror, [&] { validate_mirror(point.settings); });
+    if (const JsonNode* offset = find(choice, "ray_offset")) located(*offset, [&] { validate_ray_offset(point.settings); });
     if (point.settings.prune) require_prunable(point.settings, *find(choice, "prune"));
     return point;
   }
@@ -447,6 +443,15 @@ class Parser {
     return points;
   }
 
+  static AmbientOcclusion occlusion(const JsonNode& node) {
+    node.accept_keys(Names{"rays", "radius", "seed"});
+    AmbientOcclusion around;
+    around.radius = node.require("radius").positive_number();
+    if (const auto rays = node.find("rays")) around.rays = static_cast<int>(rays->integer(1, kMostOcclusionRays));
+    if (const auto seed = node.find("seed")) around.seed = static_cast<std::uint32_t>(seed->integer(0, UINT32_MAX));
+    return around;
+  }
+
   static void set_surfaces(Isosurfaces& iso, const std::string& key, const JsonNode& node) {
     if (key == "isovalues") iso.values = numbers(node);
     if (key == "iso_opacity") iso.opacity = numbers(node);
@@ -454,7 +459,21 @@ class Parser {
     if (key == "iso_tolerance") iso.tolerance = node.positive_number();
     if (key == "shading") iso.shading = located(node, [&] { return parse_shading(node.text()); });
     if (key == "output") iso.output = located(node, [&] { return parse_output(node.text()); });
+    if (key == "ambient_occlusion" && !node.json().is_null()) iso.ambient_occlusion = occlusion(node);
     if (key == "color_field" && !node.json().is_null()) iso.color_field = node.text();
+  }
+
+  /// Planes [a, b, c, d].
+  static std::vector<ClipPlane> clip_planes(const JsonNode& node) {
+    std::vector<ClipPlane> planes;
+    if (node.json().is_null() || (node.json().is_array() && node.json().empty())) return planes;
+    for (const JsonNode& item : node.items()) {
+      const std::vector<double> p = numbers(item);
+      if (p.size() != 4) item.fail("accepted: planes [a, b, c, d], which keep a x + b y + c z >= d in world units");
+      planes.push_back({{p[0], p[1], p[2]}, p[3]});
+    }
+    located(node, [&] { validate_clip_planes(planes); });
+    return planes;
   }
 
   static double tolerance_of(const JsonNode& node) {
@@ -468,6 +487,9 @@ class Parser {
     set_surfaces(s.isosurfaces, key, node);
     if (key == "mode") s.mode = located(node, [&] { return parse_mode(node.text()); });
     if (key == "sampling") s.sampling = located(node, [&] { return parse_sampling(node.text()); });
+    if (key == "clip_planes") s.clip_planes = clip_planes(node);
+    if (key == "ray_offset" && node.boolean()) s.ray_offset = 0;  // its seed is the experiment's
+    if (key == "mirror" && !node.json().is_null()) s.mirror = located(node, [&] { return parse_mirror(node.text()); });
     if (key == "step") s.step = node.positive_number();
     if (key == "width") s.width = static_cast<int>(node.integer(1, kMaxPictureEdge));
     if (key == "height") s.height = static_cast<int>(node.integer(1, kMaxPictureEdge));
@@ -579,6 +601,9 @@ class Parser {
 
   void parse_measuring() {
     if (const auto seed = root_.find("seed")) experiment_.seed = static_cast<std::uint64_t>(seed->integer(0, INT64_MAX));
+    for (RenderPoint& render : experiment_.renders)
+      if (render.settings.ray_offset)
+        render.settings.ray_offset = static_cast<std::uint32_t>(experiment_.seed ^ experiment_.seed >> 32);
     if (const auto context = root_.find("context")) experiment_.context = context->one_of(kContexts);
     if (const auto limit = root_.find("memory_limit"); limit && !limit->json().is_null())
       experiment_.memory_limit = limit->integer(1, INT64_MAX);
@@ -673,12 +698,20 @@ Json surfaces_json(const Isosurfaces& iso) {
   json["iso_tolerance"] = iso.tolerance;
   json["shading"] = shading_name(iso.shading);
   json["output"] = output_name(iso.output);
+  if (const auto& around = iso.ambient_occlusion)
+    json["ambient_occlusion"] = {{"rays", around->rays}, {"radius", around->radius}, {"seed", around->seed}};
   return json;
 }
 
 Json light_json(const PointLight& light) {
   const Vec3d& p = light.position;
   return {{"point_light", {p.x, p.y, p.z}}, {"ambient", light.ambient}, {"shadow_step", light.shadow_step}};
+}
+
+Json clip_planes_json(const std::vector<ClipPlane>& planes) {
+  Json json = Json::array();
+  for (const ClipPlane& p : planes) json.push_back({p.normal.x, p.normal.y, p.normal.z, p.distance});
+  return json;
 }
 
 Json render_json(const RenderPoint& render) {
@@ -695,6 +728,7 @@ Json render_json(const RenderPoint& render) {
                {"prune", s.prune},
                {"needs", s.everything ? "all" : "scene"},
                {"early_end", json_or_null(s.early_end)},
+               {"ray_offset", s.ray_offset.has_value()},
                {"view", to_json(render.view)},
                {"view_name", render.view_name},
                {"transfer_function", nullptr},
@@ -704,6 +738,9 @@ Json render_json(const RenderPoint& render) {
   if (s.draws_surfaces()) json.update(surfaces_json(s.isosurfaces));
   if (s.point_light) json.update(light_json(*s.point_light));
   // only where they are in use, so that the names of other records stay
+  if (s.mirror) json["mirror"] = mirror_name(*s.mirror);
+  if (s.ray_offset) json["seed"] = *s.ray_offset;
+  if (!s.clip_planes.empty()) json["clip_planes"] = clip_planes_json(s.clip_planes);
   if (s.level_of_detail) json["level_of_detail"] = *s.level_of_detail;
   if (s.max_level) json["max_level"] = *s.max_level;
   if (!render.transfer_function_name.empty()) {

@@ -94,6 +94,8 @@ Json surfaces_json(const Isosurfaces& isosurfaces);
 
 /// What a record holds of a lamp.
 Json light_json(const PointLight& light);
+/// Planes [a, b, c, d], as in experiment files.
+Json clip_planes_json(const std::vector<ClipPlane>& planes);
 
 /// The `render` part of a record, names of view and transfer function included.
 Json render_json(const RenderPoint& render);

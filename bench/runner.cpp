@@ -473,6 +473,8 @@ Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definit
   key["view"] = to_json(scene.view);
   if (scene.settings.draws_surfaces()) {
     key["isosurfaces"] = surfaces_json(scene.settings.isosurfaces);
+    if (const auto& around = scene.settings.isosurfaces.ambient_occlusion)
+      key["isosurfaces"]["ambient_occlusion"] = {{"radius", around->radius}};  // the rest is sampling
     for (const int field : more_fields(hierarchy, scene)) key["color_field"] = hierarchy.content_hash(field);
   }
   if (scene.settings.draws_volume() || scene.settings.draws_surfaces())
@@ -481,6 +483,8 @@ Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definit
     key["light"] = light_json(*scene.settings.point_light);
     key["light"].erase("shadow_step");  // sampling
   }
+  if (scene.settings.mirror) key["mirror"] = mirror_name(*scene.settings.mirror);
+  if (!scene.settings.clip_planes.empty()) key["clip_planes"] = clip_planes_json(scene.settings.clip_planes);
   if (scene.region)
     for (const Vec3d& corner : *scene.region) key["region"].push_back({corner.x, corner.y, corner.z});
   key["step"] = step;

@@ -36,6 +36,8 @@ const Scene& require_drawable(const Scene& scene, const EncodedField& field) {
                           integrator_name(s.integrator)));
   if (s.prunes_levels()) refuse(s, "level_of_detail and max_level are not available");
   if (s.point_light) refuse(s, "point_light is not available: in single passes a secondary ray would leave its box");
+  if (s.ray_offset && s.draws_slices()) refuse(s, "ray_offset is not available: slices lie where they lie for all rays");
+  if (s.mirror) refuse(s, "mirror is not available: boxes of the image are not drawn");
   if (s.early_end) refuse(s, "early_end is not available: a box's shader does not know what was drawn before it");
   if (s.slice_target == SliceTarget::rgba8 && !s.draws_slices()) refuse(s, "slice_target rgba8 belongs to slices");
   if (s.slice_target == SliceTarget::rgba8 && s.mode != Mode::dvr)

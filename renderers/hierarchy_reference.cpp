@@ -11,8 +11,10 @@
 #include <map>
 #include <mutex>
 
+#include "renderers/reference_clip.hpp"
 #include "renderers/reference_field.hpp"
 #include "renderers/reference_light.hpp"
+#include "renderers/reference_parts.hpp"
 #include "renderers/reference_point.hpp"
 #include "renderers/reference_surface.hpp"
 #include "renderers/reference_tracer.hpp"
@@ -31,7 +33,9 @@ struct Drawing {
   Mode mode;
   double part;  // world length of the largest part
   const TransferTable* table;
-  const AnalyticField* truth;  // drawn instead of the field, where it is not null
+  const AnalyticField* truth;     // drawn instead of the field, where it is not null
+  std::vector<ClipPlane> planes;  // finest cells
+  std::optional<Mirror> mirror;
 };
 
 Vec3d to_index(const AmrHierarchy& h, const Vec3d& p_world) {
@@ -50,17 +54,17 @@ Drawing make_drawing(const AmrHierarchy& h, const Scene& scene, double step, con
             scene.settings.mode,
             step * std::min({spacing.x, spacing.y, spacing.z}),
             table,
-            truth};
+            truth,
+            {},
+            {}};
+  d.mirror = scene.settings.mirror;
+  for (const ClipPlane& plane : scene.settings.clip_planes) d.planes.push_back(in_finest_cells(h, plane));
   if (scene.region) {
     d.lower = glm::max(d.lower, to_index(h, (*scene.region)[0]));
     d.upper = glm::min(d.upper, to_index(h, (*scene.region)[1]));
   }
   return d;
 }
-
-struct Span {
-  double from, to;
-};
 
 /// The ray's stretch in a closed box, not before its start; nullopt where they do not meet.
 std::optional<Span> stretch_in(const IndexRay& ray, const Vec3d& lower, const Vec3d& upper) {
@@ -118,18 +122,30 @@ class AnalyticRay {
   const IndexRay& ray_;
 };
 
-/// Pieces of the field, or of the analytic one in its place.
+/// Pieces of the field, or of the analytic one in its place, through all parts of a ray; places count from its first.
 template <class Visit>
-void trace(ReferenceTracer& tracer, const IndexRay& ray, double end, const Drawing& drawing, Visit&& visit) {
-  if (drawing.truth == nullptr) return tracer.trace(ray, end, visit);
-  const AnalyticRay analytic(drawing, ray);
-  tracer.trace(ray, end, [&](const PieceFunction&, double from, double to) { return analytic.visit_parts(from, to, visit); });
+void trace(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const Drawing& drawing, Visit&& visit) {
+  bool more = true;
+  for (const RayPart& part : parts) {
+    if (!more) return;
+    const auto visit_piece = [&](const PieceFunction& f, double from, double to) {
+      more = visit(f, part.start + from, part.start + to);
+      return more;
+    };
+    if (drawing.truth == nullptr) {
+      tracer.trace(part.ray, part.length, visit_piece);
+      continue;
+    }
+    const AnalyticRay analytic(drawing, part.ray);
+    tracer.trace(part.ray, part.length,
+                 [&](const PieceFunction&, double from, double to) { return analytic.visit_parts(from, to, visit_piece); });
+  }
 }
 
-void draw_light(ReferenceTracer& tracer, const IndexRay& ray, double end, const Drawing& drawing, LightIntegral::Arriving lamp,
+void draw_light(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const Drawing& drawing, LightIntegral::Arriving lamp,
                 double* pixel) {
   LightIntegral light(*drawing.table, std::move(lamp));
-  trace(tracer, ray, end, drawing, [&](const PieceFunction& f, double from, double to) {
+  trace(tracer, parts, drawing, [&](const PieceFunction& f, double from, double to) {
     light.add(f, to - from, drawing.part, 0, 1, from);
     return light.transmittance() >= LightIntegral::kOpaque;
   });
@@ -137,19 +153,19 @@ void draw_light(ReferenceTracer& tracer, const IndexRay& ray, double end, const 
   pixel[3] = 1 - light.transmittance();
 }
 
-double line_integral(ReferenceTracer& tracer, const IndexRay& ray, double end, const Drawing& drawing) {
+double line_integral(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const Drawing& drawing) {
   const double part = drawing.part;
   double sum = 0;
-  trace(tracer, ray, end, drawing, [&](const PieceFunction& f, double from, double to) {
+  trace(tracer, parts, drawing, [&](const PieceFunction& f, double from, double to) {
     sum += (to - from) * mean(f, static_cast<int>(std::clamp(std::ceil((to - from) / part), 1.0, 16.0)));
     return true;
   });
   return sum;
 }
 
-double line_maximum(ReferenceTracer& tracer, const IndexRay& ray, double end, const Drawing& drawing) {
+double line_maximum(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const Drawing& drawing) {
   double best = -std::numeric_limits<double>::infinity();
-  trace(tracer, ray, end, drawing, [&](const PieceFunction& f, double, double) {
+  trace(tracer, parts, drawing, [&](const PieceFunction& f, double, double) {
     if (f.upper > best) best = std::max(best, maximum(f));
     return true;
   });
@@ -172,24 +188,33 @@ LightIntegral::Arriving arriving_light(Worker& worker, const IndexRay& ray) {
 void draw_pixel(Worker& worker, const Drawing& drawing, int x, int y, Picture& picture) {
   const WorldRay world = camera_ray(drawing.camera, x, y, picture.width, picture.height);
   IndexRay ray{(world.origin - drawing.domain_lower) * drawing.cells_a_length, world.direction * drawing.cells_a_length};
-  const auto span = stretch_in(ray, drawing.lower, drawing.upper);
-  if (!span) return;
+  Vec3d lower = drawing.lower;
+  Vec3d upper = drawing.upper;
+  double face = 0;
+  if (drawing.mirror) {  // the image is drawn too
+    const int axis = drawing.mirror->axis;
+    face = drawing.mirror->upper ? upper[axis] : lower[axis];
+    (drawing.mirror->upper ? upper : lower)[axis] += (drawing.mirror->upper ? 1 : -1) * (upper[axis] - lower[axis]);
+  }
+  auto span = stretch_in(ray, lower, upper);
+  if (span) span = cut(ray, drawing.planes, *span);
+  if (!span || !(span->to > span->from)) return;
   ray.origin += span->from * ray.direction;  // from here on no digits are spent on the way to the mesh
-  const double end = span->to - span->from;
+  const std::vector<RayPart> parts = parts_of(ray, world.direction, span->to - span->from, drawing.mirror, face);
   double* pixel = picture.pixel(x, y);
   switch (drawing.mode) {
     case Mode::dvr:
-      draw_light(worker.tracer, ray, end, drawing, arriving_light(worker, ray), pixel);
+      draw_light(worker.tracer, parts, drawing, arriving_light(worker, ray), pixel);
       break;
     case Mode::projection:
-      *pixel = line_integral(worker.tracer, ray, end, drawing);
+      *pixel = line_integral(worker.tracer, parts, drawing);
       break;
     case Mode::mip:
-      *pixel = line_maximum(worker.tracer, ray, end, drawing);
+      *pixel = line_maximum(worker.tracer, parts, drawing);
       break;
     case Mode::iso:
     case Mode::dvr_iso:
-      worker.painter->draw(worker.tracer, ray, world.direction, span->from, end, arriving_light(worker, ray), pixel);
+      worker.painter->draw(worker.tracer, parts, drawing.mirror, span->from, arriving_light(worker, ray), pixel);
       break;
   }
 }
@@ -201,6 +226,8 @@ void check(const Scene& scene, double step) {
   if (scene.settings.draws_volume()) validate(scene.transfer_function);
   if (scene.settings.draws_surfaces()) validate(scene.settings.isosurfaces);
   validate_light(scene.settings);
+  validate_clip_planes(scene.settings.clip_planes);
+  validate_mirror(scene.settings);
 }
 
 double extinction_scale(const AmrHierarchy& h, const TransferFunction& tf) {
@@ -269,6 +296,11 @@ Picture HierarchyReference::draw(const Scene& scene, double step, const Analytic
   const Drawing drawing = make_drawing(h, scene, step, table ? &*table : nullptr, truth);
   std::optional<SurfaceScene> surfaces;
   if (scene.settings.draws_surfaces()) surfaces.emplace(scene, data_->field, color_field, drawing.table, drawing.part);
+  if (surfaces) {
+    surfaces->lower = drawing.lower;
+    surfaces->upper = drawing.upper;
+    surfaces->planes = drawing.planes;
+  }
   std::optional<LampScene> lamp;
   if (scene.settings.point_light)
     lamp.emplace(scene, data_->field, extinction_scale(h, scene.transfer_function), drawing.lower, drawing.upper, drawing.part);

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "renderers/reference_clip.hpp"
+
 namespace amrtex {
 namespace {
 
@@ -22,6 +24,7 @@ LampScene::LampScene(const Scene& scene, const ReferenceField& f, double extinct
       ambient(scene.settings.point_light->ambient) {
   const AmrHierarchy& h = f.hierarchy();
   cells_a_length = Vec3d(h.cells(h.finest_level())) / (h.domain_upper() - h.domain_lower());
+  for (const ClipPlane& plane : scene.settings.clip_planes) planes.push_back(in_finest_cells(h, plane));
   position = (scene.settings.point_light->position - h.domain_lower()) * cells_a_length;
 }
 
@@ -37,6 +40,7 @@ double LampTracer::light_at(const Vec3d& p) {
     const double face = ray.direction[a] > 0 ? scene_.upper[a] : scene_.lower[a];
     end = std::min(end, (face - p[a]) / ray.direction[a]);
   }
+  end = cut(ray, scene_.planes, {0, end}).to;  // it begins where something is drawn, whatever rounding says
   LightIntegral shade(scene_.table);
   tracer_.trace(ray, end, [&](const PieceFunction& f, double from, double to) {
     shade.add(f, to - from, scene_.part);

@@ -19,6 +19,7 @@ struct LampScene {
   Vec3d lower, upper;    ///< of what is drawn, finest cells
   double part;           ///< world length of the largest part
   double ambient;
+  std::vector<ClipPlane> planes;  ///< that cut what is drawn, finest cells
 };
 
 /// Traces secondary rays; of one thread.

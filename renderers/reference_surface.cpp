@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "renderers/reference_clip.hpp"
 #include "renderers/reference_point.hpp"
 
 namespace amrtex {
@@ -13,6 +14,11 @@ namespace {
 constexpr double kTouch = 64 * std::numeric_limits<double>::epsilon();
 // gaps between pieces, relative to the ray's length in the mesh, that are rounding
 constexpr double kJoint = 1e-12;
+
+// Rays of ambient occlusion from each hit, whatever the scene asks for: their share is off by about 1/500.
+constexpr int kOpenRays = 512;
+// where they begin above the surface, finest cells: rounding must not put them behind it
+constexpr double kAbove = 1e-3;
 
 double touching(const PieceFunction& f) {
   double scale = std::max(std::abs(f.lower), std::abs(f.upper));
@@ -85,45 +91,54 @@ SurfaceScene::SurfaceScene(const Scene& s, const ReferenceField& f, const Refere
   for (const double value : settings.values) rgb.push_back(surface_color(scene, value));
 }
 
-void SurfacePainter::draw(ReferenceTracer& tracer, const IndexRay& ray, const Vec3d& direction, double start, double end,
-                          const LightIntegral::Arriving& lamp, double* pixel) {
-  if (scene_.settings.output == Output::color) return draw_color(tracer, ray, direction, end, lamp, pixel);
-  SurfaceFinder finder(scene_.settings.values, kJoint * end);
-  tracer.trace(ray, end, [&](const PieceFunction& f, double from, double to) {
-    const auto& crossings = finder.next(f, from, to);
-    if (crossings.empty()) return true;
-    const double s = crossings.front().s;
-    const double t = from + s * (to - from);
-    if (scene_.settings.output == Output::depth) {
-      *pixel = start + t;
-    } else {
-      const Vec3d normal = normal_at(point_of(tracer, ray, t, s));
-      for (int a = 0; a < 3; ++a) pixel[a] = normal[a];
-      pixel[3] = 1;
-    }
-    return false;
-  });
+void SurfacePainter::draw(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const std::optional<Mirror>& mirror,
+                          double start, const LightIntegral::Arriving& lamp, double* pixel) {
+  if (scene_.settings.output == Output::color) return draw_color(tracer, parts, lamp, pixel);
+  SurfaceFinder finder(scene_.settings.values, kJoint * (parts.back().start + parts.back().length));
+  bool found = false;
+  for (const RayPart& part : parts) {
+    if (found) return;
+    tracer.trace(part.ray, part.length, [&](const PieceFunction& f, double from, double to) {
+      const auto& crossings = finder.next(f, part.start + from, part.start + to);
+      found = !crossings.empty();
+      if (!found) return true;
+      const double s = crossings.front().s;
+      const double t = from + s * (to - from);
+      if (scene_.settings.output == Output::depth) {
+        *pixel = start + part.start + t;
+      } else {
+        Vec3d normal = normal_at(point_of(tracer, part.ray, t, s));
+        if (part.mirrored) normal[mirror->axis] = -normal[mirror->axis];
+        for (int a = 0; a < 3; ++a) pixel[a] = normal[a];
+        pixel[3] = 1;
+      }
+      return false;
+    });
+  }
 }
 
-void SurfacePainter::draw_color(ReferenceTracer& tracer, const IndexRay& ray, const Vec3d& direction, double end,
-                                const LightIntegral::Arriving& lamp, double* pixel) {
+void SurfacePainter::draw_color(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const LightIntegral::Arriving& lamp,
+                                double* pixel) {
   const Isosurfaces& surfaces = scene_.settings;
   LightIntegral light = scene_.volume != nullptr ? LightIntegral(*scene_.volume, lamp) : LightIntegral();
-  SurfaceFinder finder(surfaces.values, kJoint * end);
-  tracer.trace(ray, end, [&](const PieceFunction& f, double from, double to) {
-    double behind = 0;  // the last crossing
-    for (const Crossing& c : finder.next(f, from, to)) {
-      light.add(f, to - from, scene_.part, behind, c.s, from);
-      behind = c.s;
-      if (light.transmittance() < LightIntegral::kOpaque) return false;
-      const double t = from + c.s * (to - from);
-      const Vec3d p = point_of(tracer, ray, t, c.s);
-      const Vec3d rgb = color_at(p, c.surface, direction) * (lamp ? lamp(t) : 1.0);
-      light.add_surface(rgb, surfaces.opacity.empty() ? 1 : surfaces.opacity[c.surface]);
-    }
-    light.add(f, to - from, scene_.part, behind, 1, from);
-    return light.transmittance() >= LightIntegral::kOpaque;
-  });
+  SurfaceFinder finder(surfaces.values, kJoint * (parts.back().start + parts.back().length));
+  for (const RayPart& part : parts) {
+    if (light.transmittance() < LightIntegral::kOpaque) break;
+    tracer.trace(part.ray, part.length, [&](const PieceFunction& f, double from, double to) {
+      double behind = 0;  // the last crossing
+      for (const Crossing& c : finder.next(f, part.start + from, part.start + to)) {
+        light.add(f, to - from, scene_.part, behind, c.s, from);
+        behind = c.s;
+        if (light.transmittance() < LightIntegral::kOpaque) return false;
+        const double t = from + c.s * (to - from);
+        const Vec3d p = point_of(tracer, part.ray, t, c.s);
+        const Vec3d rgb = color_at(p, c.surface, part.direction) * (lamp ? lamp(t) : 1.0);
+        light.add_surface(rgb, surfaces.opacity.empty() ? 1 : surfaces.opacity[c.surface]);
+      }
+      light.add(f, to - from, scene_.part, behind, 1, from);
+      return light.transmittance() >= LightIntegral::kOpaque;
+    });
+  }
   for (int c = 0; c < 3; ++c) pixel[c] = light.color()[c];
   pixel[3] = 1 - light.transmittance();
 }
@@ -136,9 +151,42 @@ Vec3d SurfacePainter::color_at(const Vec3d& p, std::size_t surface, const Vec3d&
     const auto value = position ? value_at(*scene_.color_field, *position, &color_vertices_) : std::nullopt;
     if (value) rgb = surface_color(scene_.scene, *value);
   }
-  if (scene_.settings.shading == Shading::none) return rgb;
+  if (scene_.settings.shading == Shading::none && !around_) return rgb;
   const Vec3d normal = normal_at(p);
-  return normal == Vec3d(0) ? rgb : rgb * surface_light(glm::dot(normal, direction));
+  if (normal == Vec3d(0)) return rgb;
+  const double cosine = glm::dot(normal, direction);
+  if (scene_.settings.shading != Shading::none) rgb *= surface_light(cosine);
+  return around_ ? rgb * open_share(p, cosine > 0 ? -normal : normal) : rgb;
+}
+
+/// Share of the rays from p, cosine-weighted around `up`, that meet no surface within the radius.
+double SurfacePainter::open_share(const Vec3d& p, const Vec3d& up) {
+  const AmrHierarchy& h = scene_.field.hierarchy();
+  const Vec3d cells_a_length = Vec3d(h.cells(h.finest_level())) / (h.domain_upper() - h.domain_lower());
+  const Vec3d right = glm::normalize(glm::cross(up, std::abs(up.x) < 0.7 ? Vec3d(1, 0, 0) : Vec3d(0, 1, 0)));
+  const Vec3d ahead = glm::cross(up, right);
+  const Vec3d from = glm::clamp(p + kAbove * up, scene_.lower, scene_.upper);
+  int open = 0;
+  for (int i = 0; i < kOpenRays; ++i) {
+    const double square = (i + 0.5) / kOpenRays;
+    const double angle = i * 3.14159265358979323846 * (3 - std::sqrt(5.0));
+    const Vec3d way = (right * std::cos(angle) + ahead * std::sin(angle)) * std::sqrt(square) + up * std::sqrt(1 - square);
+    const IndexRay ray{from, way * cells_a_length};
+    double end = scene_.settings.ambient_occlusion->radius;
+    for (int a = 0; a < 3; ++a)
+      if (ray.direction[a] != 0)
+        end = std::min(end, ((ray.direction[a] > 0 ? scene_.upper : scene_.lower)[a] - from[a]) / ray.direction[a]);
+    end = cut(ray, scene_.planes, {0, end}).to;
+    bool met = false;
+    SurfaceFinder finder(scene_.settings.values, kJoint * end);
+    if (end > 0)
+      around_->trace(ray, end, [&](const PieceFunction& f, double t0, double t1) {
+        met = !finder.next(f, t0, t1).empty();
+        return !met;
+      });
+    open += met ? 0 : 1;
+  }
+  return static_cast<double>(open) / kOpenRays;
 }
 
 Vec3d SurfacePainter::normal_at(const Vec3d& p) {

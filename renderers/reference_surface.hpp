@@ -6,6 +6,7 @@
 
 #include "renderers/ray_integral.hpp"
 #include "renderers/reference_field.hpp"
+#include "renderers/reference_parts.hpp"
 #include "renderers/reference_tracer.hpp"
 
 namespace amrtex {
@@ -53,25 +54,30 @@ struct SurfaceScene {
   const TransferTable* volume;        ///< null: surfaces alone
   double part;                        ///< world length of the volume's largest part
   std::vector<Vec3d> rgb;             ///< one an isovalue
+  Vec3d lower{0}, upper{0};           ///< of what is drawn, finest cells
+  std::vector<ClipPlane> planes;      ///< that cut it, finest cells
 };
 
 /// Draws rays; of one thread.
 class SurfacePainter {
  public:
-  explicit SurfacePainter(const SurfaceScene& scene) : scene_(scene) {}
+  explicit SurfacePainter(const SurfaceScene& scene) : scene_(scene) {
+    if (scene.settings.ambient_occlusion) around_.emplace(scene.field);
+  }
 
-  /// `start`: world distance from the eye to t = 0; `direction`: the ray's, world, unit length; `lamp`: see LightIntegral.
-  void draw(ReferenceTracer& tracer, const IndexRay& ray, const Vec3d& direction, double start, double end,
+  /// `start`: world distance from the eye to the first part; `lamp`: see LightIntegral.
+  void draw(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const std::optional<Mirror>& mirror, double start,
             const LightIntegral::Arriving& lamp, double* pixel);
 
  private:
-  void draw_color(ReferenceTracer& tracer, const IndexRay& ray, const Vec3d& direction, double end,
-                  const LightIntegral::Arriving& lamp, double* pixel);
+  void draw_color(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const LightIntegral::Arriving& lamp, double* pixel);
   Vec3d color_at(const Vec3d& p, std::size_t surface, const Vec3d& direction);
+  double open_share(const Vec3d& p, const Vec3d& up);
   Vec3d normal_at(const Vec3d& p);
 
   const SurfaceScene& scene_;
   VertexCache vertices_, color_vertices_;
+  std::optional<ReferenceTracer> around_;  // of secondary rays
 };
 
 }  // namespace amrtex

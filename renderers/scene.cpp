@@ -327,6 +327,17 @@ void validate(const Isosurfaces& iso) {
   for (const auto& point : iso.color) check_color(point.rgb, "isosurfaces: 'surface_color'");
   if (!(iso.tolerance > 0 && iso.tolerance <= 1))
     throw UsageError(fmt::format("isosurfaces: 'iso_tolerance' is {}; it must lie in (0, 1] cell widths", iso.tolerance));
+  if (!iso.ambient_occlusion) return;
+  const AmbientOcclusion& around = *iso.ambient_occlusion;
+  if (around.rays < 1 || around.rays > kMostOcclusionRays)
+    throw UsageError(
+        fmt::format("isosurfaces: 'ambient_occlusion' has {} rays; it accepts 1 to {}", around.rays, kMostOcclusionRays));
+  if (!(around.radius > 0) || !std::isfinite(around.radius))
+    throw UsageError(
+        fmt::format("isosurfaces: 'ambient_occlusion' has the radius {}; it must be above 0, in world units", around.radius));
+  if (iso.output != Output::color)
+    throw UsageError(fmt::format("isosurfaces: 'ambient_occlusion' darkens colours: it accepts the output color, not {}",
+                                 output_name(iso.output)));
 }
 
 void validate_light(const RenderSettings& s) {
@@ -347,6 +358,60 @@ void validate_light(const RenderSettings& s) {
   throw UsageError(fmt::format("'point_light' lights a volume: the modes dvr and dvr_iso (output color) accept it, not {}{}",
                                mode_name(s.mode),
                                measures ? fmt::format(" with output {}", output_name(s.isosurfaces.output)) : ""));
+}
+
+void validate_clip_planes(const std::vector<ClipPlane>& planes) {
+  if (planes.size() > kMostClipPlanes)
+    throw UsageError(fmt::format("'clip_planes' has {} planes; at most {} are supported", planes.size(), kMostClipPlanes));
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    const Vec3d& n = planes[i].normal;
+    if (!finite(n) || !std::isfinite(planes[i].distance))
+      throw UsageError(fmt::format("'clip_planes' plane {}: [{}, {}, {}, {}] must be four finite numbers", i, n.x, n.y, n.z,
+                                   planes[i].distance));
+    if (n == Vec3d(0))
+      throw UsageError(
+          fmt::format("'clip_planes' plane {}: the normal (0, 0, 0) has no direction; accepted: [a, b, c, d] with "
+                      "a, b or c other than 0, which keeps a x + b y + c z >= d",
+                      i));
+  }
+}
+
+void validate_ray_offset(const RenderSettings& s) {
+  if (!s.ray_offset || s.integrator == Integrator::exponential_midpoint || s.integrator == Integrator::euler) return;
+  throw UsageError(
+      fmt::format("'ray_offset' moves intervals that are sampled in their middle: the integrators exponential_midpoint "
+                  "and euler accept it, not {}",
+                  integrator_name(s.integrator)));
+}
+
+std::string mirror_name(const Mirror& mirror) { return fmt::format("{}{}", mirror.upper ? '+' : '-', "xyz"[mirror.axis]); }
+
+Mirror parse_mirror(std::string_view name) {
+  for (const int axis : {0, 1, 2})
+    for (const bool upper : {false, true})
+      if (name == mirror_name({axis, upper})) return {axis, upper};
+  throw UsageError(fmt::format("unknown face '{}'; accepted are -x, +x, -y, +y, -z, +z", name));
+}
+
+void validate_mirror(const RenderSettings& s) {
+  if (!s.mirror) return;
+  if (s.point_light) throw UsageError("'mirror': rays to the lamp of 'point_light' do not see the image; accepted: one of both");
+  if (s.draws_surfaces() && s.isosurfaces.ambient_occlusion)
+    throw UsageError("'mirror': rays of 'ambient_occlusion' do not see the image; accepted: one of both");
+  if (s.level_of_detail)
+    throw UsageError("'mirror': 'level_of_detail' knows the sizes of cells and not of their images; accepted: one of both");
+}
+
+ClipPlane in_finest_cells(const AmrHierarchy& h, const ClipPlane& plane) {
+  const auto largest = [](const Vec3d& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); };
+  const double size = largest(plane.normal);
+  const Vec3d spacing = h.spacing(h.finest_level());
+  const double unit = largest(spacing);
+  const Vec3d normal = plane.normal / size;
+  const Vec3d in_cells = normal * (spacing / unit);
+  const double distance = plane.distance / size - glm::dot(normal, h.domain_lower());
+  const double scale = largest(in_cells);
+  return {in_cells / scale, distance / unit / scale};
 }
 
 TransferFunction surface_colors(const Scene& scene) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -104,6 +105,15 @@ Shading parse_shading(std::string_view name);
 
 inline constexpr std::size_t kMostIsovalues = 16;
 
+/// Light that reaches a surface from around it: the share of `rays` from a hit, cosine-weighted over the hemisphere on the eye's
+/// side, that meet no isosurface within `radius`. A surface's colour is multiplied by it.
+struct AmbientOcclusion {
+  int rays = 16;           ///< 1 to kMostOcclusionRays
+  double radius = 0;       ///< world, above 0
+  std::uint32_t seed = 0;  ///< of a turn of the rays around the normal, one a pixel
+};
+inline constexpr int kMostOcclusionRays = 1024;
+
 /// Isosurfaces of the drawn field (modes `iso` and `dvr_iso`).
 struct Isosurfaces {
   std::vector<double> values;   ///< isovalues in field units, ascending; 1 to kMostIsovalues
@@ -114,6 +124,7 @@ struct Isosurfaces {
   double tolerance = 1.0 / 1024;  ///< bound on a hit's position along the ray, cell widths as `step`
   Shading shading = Shading::gradient;
   Output output = Output::color;
+  std::optional<AmbientOcclusion> ambient_occlusion;  ///< absent: surfaces take no light from one another; output `color`
 };
 
 /// Throws UsageError (no isovalue, too many, not ascending, opacities that do not fit, ...).
@@ -126,6 +137,24 @@ struct PointLight {
   double ambient = 0.1;    ///< light where the lamp does not reach, in [0, 1]
   double shadow_step = 1;  ///< of the secondary ray: cell widths of each region (smallest edge)
 };
+
+/// A plane that cuts what is drawn: points with dot(normal, p) >= distance are kept.
+struct ClipPlane {
+  Vec3d normal{1, 0, 0};  ///< world, of any length but 0
+  double distance = 0;    ///< from the world's origin, in lengths of the normal
+};
+inline constexpr std::size_t kMostClipPlanes = 8;
+/// The same plane in cells of the finest level, with a normal whose largest component is 1.
+ClipPlane in_finest_cells(const AmrHierarchy& hierarchy, const ClipPlane& plane);
+
+/// A face of what is drawn (the domain, or the sub-box) behind which its mirror image is drawn too.
+struct Mirror {
+  int axis = 0;        ///< 0 to 2
+  bool upper = false;  ///< the face at the axis's upper end
+};
+/// "-x", "+x", "-y", "+y", "-z", "+z"; the second throws a UsageError that names these.
+std::string mirror_name(const Mirror& mirror);
+Mirror parse_mirror(std::string_view name);
 
 struct RenderSettings {
   ConsumerKind consumer = ConsumerKind::raycast;
@@ -143,6 +172,10 @@ struct RenderSettings {
   bool everything = false;          ///< structures hold also what the scene does not need, to see what leaving out saves
   Isosurfaces isosurfaces;
   std::optional<PointLight> point_light;  ///< absent: light of all places alike
+  std::vector<ClipPlane> clip_planes;     ///< at most kMostClipPlanes; drawn is what all of them keep, and a cut is no surface
+  /// Seed of a random offset for each ray, by which its intervals are moved (Wald et al. 2020, section 4.2); off when absent.
+  std::optional<std::uint32_t> ray_offset;
+  std::optional<Mirror> mirror;  ///< absent: the field alone
   /// Refined cells are drawn themselves where they are smaller on the picture, pixels; off when absent.
   std::optional<double> level_of_detail;
   std::optional<int> max_level;  ///< nothing finer is drawn where a cell of this level or a coarser one lies; off when absent
@@ -159,6 +192,12 @@ struct RenderSettings {
 void validate_prune(const RenderSettings& settings);
 /// Throws UsageError: a lamp whose numbers are none, or in a picture without a volume. Nothing where there is no lamp.
 void validate_light(const RenderSettings& settings);
+/// Throws UsageError that names the plane: too many, no direction, numbers that are none.
+void validate_clip_planes(const std::vector<ClipPlane>& planes);
+/// Throws UsageError where the integrator's samples are not the middles of intervals that an offset can move.
+void validate_ray_offset(const RenderSettings& settings);
+/// Throws UsageError where a mirror does not go with a lamp or level of detail.
+void validate_mirror(const RenderSettings& settings);
 /// Throws UsageError where the integrator does not go with the mode, the sampling or the tolerance.
 void validate_integrator(const RenderSettings& settings);
 

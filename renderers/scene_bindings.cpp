@@ -240,6 +240,35 @@ void add_light(const AmrHierarchy& h, const RenderSettings& s, SceneBindings& b)
   b.uniforms.push_back({"u_shadow_step", std::vector<double>{s.point_light->shadow_step}});
 }
 
+void add_clip_planes(const AmrHierarchy& h, const RenderSettings& s, SceneBindings& b) {
+  validate_clip_planes(s.clip_planes);
+  b.defines.emplace_back("AMRTEX_CLIP_PLANES", static_cast<int>(s.clip_planes.size()));
+  constexpr double kFar = 1e30;  // a plane beyond it keeps all or nothing, and is a float
+  std::vector<double> planes;
+  for (const ClipPlane& plane : s.clip_planes) {
+    const ClipPlane p = in_finest_cells(h, plane);
+    planes.insert(planes.end(), {p.normal.x, p.normal.y, p.normal.z, std::clamp(p.distance, -kFar, kFar)});
+  }
+  if (!planes.empty()) b.uniforms.push_back({"u_clip_planes", planes, true});
+}
+
+void add_ray_offset(const RenderSettings& s, SceneBindings& b) {
+  validate_ray_offset(s);
+  b.defines.emplace_back("AMRTEX_RAY_OFFSET", s.ray_offset ? 1 : 0);
+  if (s.ray_offset) b.uniforms.push_back({"u_ray_seed", std::vector<int>{static_cast<int>(*s.ray_offset)}});
+}
+
+void add_occlusion(const AmrHierarchy& h, const RenderSettings& s, SceneBindings& b) {
+  const auto& around = s.isosurfaces.ambient_occlusion;
+  const bool on = s.draws_surfaces() && around;
+  b.defines.emplace_back("AMRTEX_OCCLUSION", on ? 1 : 0);
+  if (!on) return;
+  constexpr double kFar = 1e30;  // farther than any domain, and a float
+  b.uniforms.push_back({"u_occlusion_rays", std::vector<int>{around->rays}});
+  b.uniforms.push_back({"u_occlusion_radius", std::vector<double>{std::min(around->radius / smallest_edge(h), kFar)}});
+  b.uniforms.push_back({"u_occlusion_seed", std::vector<int>{static_cast<int>(around->seed)}});
+}
+
 void require_detail(const EncodedField& field, const RenderSettings& s) {
   const auto& defines = field.shader.defines;
   const auto it = std::find(defines.begin(), defines.end(), std::pair<std::string, int>("AMRTEX_LEVEL_OF_DETAIL", 1));
@@ -447,6 +476,11 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
                {"AMRTEX_SKIP", s.skip ? 1 : 0},
                {"AMRTEX_EARLY_END", (s.early_end || by_tolerance) && s.draws_volume() ? 1 : 0},
                {"AMRTEX_ISOVALUES", s.draws_surfaces() ? static_cast<int>(s.isosurfaces.values.size()) : 0}};
+  add_clip_planes(h, s, b);
+  add_ray_offset(s, b);
+  validate_mirror(s);
+  add_occlusion(h, s, b);
+  b.defines.emplace_back("AMRTEX_MIRROR", s.mirror ? 2 * s.mirror->axis + (s.mirror->upper ? 2 : 1) : 0);
   add_light(h, s, b);
   if (s.draws_surfaces()) add_surfaces(scene, field, b);
   add_integrator(scene, field, extinction_unit(h, scene), b);
@@ -462,7 +496,8 @@ SceneNeeds scene_needs(const Scene& scene, Filter filter, Filtering filtering) {
   needs.everything = scene.settings.everything;
   needs.value_ranges = scene.settings.skip || needs.everything;
   const Shading shading = scene.settings.draws_surfaces() ? scene.settings.isosurfaces.shading : Shading::none;
-  const bool lit = shading == Shading::gradient;
+  const bool lit =
+      shading == Shading::gradient || (scene.settings.draws_surfaces() && scene.settings.isosurfaces.ambient_occlusion);
   needs.analytic_gradients = shading == Shading::analytic;
   needs.gradients = lit || needs.everything;
   if (!scene.settings.prune) return needs;

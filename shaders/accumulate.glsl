@@ -56,6 +56,7 @@ STRUCT Accumulation {
   int end_level;       // by tolerance: level of the region that it was taken in
   real stride;         // by tolerance: length of the next interval to try
   vec4r surface;       // depth: world distance to the first surface; normal: its normal, 1
+  bool probing;        // a secondary ray that looks for surfaces and gathers nothing
   ivec3 counted;       // samples, regions, regions skipped
 };
 
@@ -77,6 +78,7 @@ Accumulation empty_accumulation() {
   a.end_level = -1;
   a.stride = real(1e30);
   a.surface = vec4r(0);
+  a.probing = false;
   a.counted = ivec3(0);
   return a;
 }

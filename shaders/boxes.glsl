@@ -11,7 +11,7 @@ UNIFORM(ray_real, u_first_slice)  // units: distance of slice 0 from the eye, al
 
 // Where a ray enters and leaves the region, grown by `margin` finest cells; units from the ray's entry. False where it misses.
 bool region_interval(IN(Ray) ray, IN(Region) r, IN(ray_real) margin, OUT(ray_real) enter, OUT(ray_real) leave) {
-  enter = ray_real(0);
+  enter = ray.first;
   leave = ray.length;
   ivec3 entry_cell = make_position(ray.entry).cell;
   for (int axis = 0; axis < 3; ++axis) {
@@ -35,8 +35,8 @@ void march_lattice_box(IN(Ray) ray, IN(Region) r, INOUT(Accumulation) a) {
   ray_real enter;
   ray_real leave;
   if (!region_interval(ray, r, AMRTEX_BOX_MARGIN, enter, leave)) return;
-  int whole = int(floor(ray.length / ray_real(u_step)));
-  int from = max(int(floor(enter / ray_real(u_step))) - 2, 0);
+  int whole = full_intervals(ray);
+  int from = max(int(floor(enter / ray_real(u_step))) - 2, first_interval(ray));
   int to = min(int(ceil(leave / ray_real(u_step))) + 2, whole);
   int first = from & ~(AMRTEX_BLOCK - 1);
   if (first < to) {
@@ -56,12 +56,15 @@ void march_lattice_box(IN(Ray) ray, IN(Region) r, INOUT(Accumulation) a) {
       first += AMRTEX_BLOCK;
     } while (first < to);
   }
-  if (ray_real(u_step) * ray_real(whole) < ray.length) {
-    Position p;
-    ray_real start = ray_real(u_step) * ray_real(whole);
-    ray_real middle = (start + ray.length) * ray_real(0.5);
-    LatticeBlock rest = lattice_point(ray, whole, middle, p);
-    if (region_contains(r, p.cell)) take_lattice_point(a, rest, r, start, middle, real(ray.length - start));
+  for (int i = AMRTEX_CUT ? 0 : 1; i < 2; ++i) {  // the intervals before and behind the full ones
+    ray_real start = i == 0 ? ray.first : interval_begin(ray, whole);
+    ray_real end = i == 0 ? head_end(ray) : ray.length;
+    if (start < end && (i == 0 || first_interval(ray) <= whole)) {
+      Position p;
+      ray_real middle = (start + end) * ray_real(0.5);
+      LatticeBlock part = lattice_point(ray, whole, middle, p);
+      if (region_contains(r, p.cell)) take_lattice_point(a, part, r, start, middle, real(end - start));
+    }
   }
 }
 
@@ -71,7 +74,7 @@ void march_adaptive_box(IN(Ray) ray, IN(Region) r, INOUT(Accumulation) a) {
   if (!region_interval(ray, r, ray_real(0), enter, leave)) return;
   vec3r f = vec3r(ray.entry + ray.direction * enter - ray_vec3(r.lower));
   f = clamp(f, vec3r(0), vec3r(r.upper - r.lower));
-  march_adaptive_region(a, r, f, vec3r(ray.direction), real(leave - enter), enter, real(0.5));
+  march_adaptive_region(a, r, f, vec3r(ray.direction), real(leave - enter), enter, real(0.5), ray.phase);
 }
 
 void march_box(IN(Ray) ray, IN(Region) r, INOUT(Accumulation) a) {
@@ -88,7 +91,7 @@ bool find_slice(IN(Ray) ray, IN(Region) r, IN(int) n, OUT(Position) p, OUT(real)
   PRECISE ray_vec3 at = ray.entry + ray.direction * t;
   p = make_position(at);
   length = real(ray_real(u_step) * ray_real(AMRTEX_LATTICE != 0 ? 1 : r.width) / cosine);
-  return t >= ray_real(0) && t < ray.length && region_contains(r, p.cell);
+  return t >= ray.first && t < ray.length && region_contains(r, p.cell);
 }
 
 void take_slice(INOUT(Accumulation) a, IN(Region) r, IN(Position) p, IN(real) length) {

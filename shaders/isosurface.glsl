@@ -248,9 +248,55 @@ vec3r surface_color(IN(Position) p, IN(int) k) {
   return vec3r(u_surface_light[4 * k], u_surface_light[4 * k + 1], u_surface_light[4 * k + 2]);
 }
 
-void composite_surface(IN(Ray) ray, INOUT(Accumulation) a, IN(Position) p, IN(int) k, IN(real) lit) {
+#if AMRTEX_CPP || AMRTEX_OCCLUSION
+UNIFORM(int, u_occlusion_rays)
+UNIFORM(real, u_occlusion_radius)  // units
+
+#if !AMRTEX_CPP
+bool meets_surface(INOUT(Accumulation) a, IN(Ray) ray, IN(int) side);  // of march.glsl
+#endif
+
+// Ambient occlusion: share of the rays from a hit that meet no surface within the radius. They go to the eye's side, with a
+// density that falls with the cosine to the normal: evenly spread over a disk (a golden spiral), and up from there onto the hemisphere.
+real open_share(INOUT(Accumulation) a, IN(Ray) ray, IN(Position) p, IN(vec3r) normal, IN(int) side) {
+  if (normal == vec3r(0)) return real(1);
+  vec3r up = dot(normal, vec3r(ray.direction) / vec3r(u_cells_per_unit)) > real(0) ? -normal : normal;
+  // a basis around it without a square root (Duff et al. 2017)
+  real sense = up.z >= real(0) ? real(1) : real(-1);
+  real e = real(-1) / (sense + up.z);
+  real f = up.x * up.y * e;
+  vec3r right = vec3r(real(1) + sense * up.x * up.x * e, sense * f, -sense * up.x);
+  vec3r ahead = vec3r(f, sense + up.y * up.y * e, -up.y);
+  // off the surface by a little more than what a hit may be off it
+  ray_vec3 from = ray_vec3(p.cell) + ray_vec3(p.fraction) + ray_vec3(up * u_face_distance);
+  // where f jumps they may begin behind the surface all the same: then they have no side yet
+  FieldSample s;
+  bool has_value = sample_field(make_position(clamp(from, u_draw_lower, u_draw_upper)), s);
+  int begins = has_value && isovalues_below(s.value) == side ? side : -1;
+  int open = 0;
+  for (int i = 0; i < u_occlusion_rays; ++i) {
+    real square = (real(i) + real(0.5)) / real(u_occlusion_rays);
+    real angle = real(i) * real(2.39996322972865332) + ray.turn;
+    vec3r direction = (right * cos(angle) + ahead * sin(angle)) * sqrt(square) + up * sqrt(real(1) - square);
+    Ray probe = secondary_ray(clamp(from, u_draw_lower, u_draw_upper));
+    probe.direction = ray_vec3(direction) * u_cells_per_unit;
+    probe.length = ray_real(u_occlusion_radius);
+    end_where_drawn(probe);
+    open += meets_surface(a, probe, begins) ? 0 : 1;
+  }
+  return real(open) / real(u_occlusion_rays);
+}
+#endif
+
+// `side`: isovalues at or below f on the side from which the ray comes.
+void composite_surface(IN(Ray) ray, INOUT(Accumulation) a, IN(Position) p, IN(int) k, IN(int) side, IN(real) lit) {
   vec3r rgb = surface_color(p, k) * lit;
-  if (AMRTEX_SHADING != 0) rgb = rgb * reflected_light(ray, surface_normal(p, u_isovalues[k]));
+  vec3r normal = vec3r(0);
+  if (AMRTEX_SHADING != 0 || AMRTEX_OCCLUSION != 0) normal = surface_normal(p, u_isovalues[k]);
+  if (AMRTEX_SHADING != 0) rgb = rgb * reflected_light(ray, normal);
+#if AMRTEX_CPP || AMRTEX_OCCLUSION
+  if (AMRTEX_OCCLUSION != 0) rgb = rgb * open_share(a, ray, p, normal, side);
+#endif
   add_compensated(a, u_surface_light[4 * k + 3]);
   real transmittance = min(exp(-a.sum), a.transmittance);
   a.color += rgb * (a.transmittance - transmittance);
@@ -268,6 +314,8 @@ void draw_surface(IN(Ray) ray, INOUT(Accumulation) a) {
   Position p = make_position(ray.entry + ray.direction * c.t);
   if (AMRTEX_OUTPUT == AMRTEX_OUTPUT_DEPTH) a.surface = vec4r(real(ray.start + c.t) * u_length_unit, real(0), real(0), real(1));
   if (AMRTEX_OUTPUT == AMRTEX_OUTPUT_NORMAL) a.surface = vec4r(surface_normal(p, u_isovalues[k]), real(1));
+  if (AMRTEX_OUTPUT == AMRTEX_OUTPUT_NORMAL && AMRTEX_MIRROR != 0 && ray.mirrored)
+    a.surface[AMRTEX_MIRROR_AXIS] = -a.surface[AMRTEX_MIRROR_AXIS];
   if (AMRTEX_OUTPUT != AMRTEX_OUTPUT_COLOR) return;
   // the part of an interval between its end and the surface is moved to the other side of it
   real shift = real(c.t - a.between);
@@ -279,9 +327,18 @@ void draw_surface(IN(Ray) ray, INOUT(Accumulation) a) {
       lit[i] = lamp_light(a, i == 0 ? p : make_position(ray.entry + ray.direction * (shift > real(0) ? a.after : a.before)));
 #endif
   if (AMRTEX_DRAWS_VOLUME) shift_volume(a, value, shift, lit.y);
-  composite_surface(ray, a, p, k, lit.x);
+  composite_surface(ray, a, p, k, rising ? k : k + 1, lit.x);
   if (AMRTEX_DRAWS_VOLUME) shift_volume(a, value, -shift, lit.y);
 }
+
+#if AMRTEX_CPP || AMRTEX_MIRROR
+// A sample on the mirror, of no length: a surface between the last sample before it and the first behind it is not lost.
+void note_mirror(IN(Ray) ray, INOUT(Accumulation) a) {
+  FieldSample s;
+  bool has_value = sample_field(make_position(ray.entry + ray.direction * ray.length), s);
+  note_side(a, !has_value, s.value, ray.length, ray.length);
+}
+#endif
 
 // An opaque surface ends a ray; pictures of depth and normals end at the first.
 bool surfaces_ended(IN(Accumulation) a) {

@@ -37,6 +37,7 @@ bool region_invisible(IN(Accumulation) a, IN(Region) r) {
 #if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
   if (AMRTEX_ISOVALUES != 0 && !on_one_side(a, r.value_range)) return false;
 #endif
+  if (AMRTEX_OCCLUSION != 0 && a.probing) return true;
   if (AMRTEX_DRAWS_VOLUME) return !transfer_visible(r.value_range);
   if (AMRTEX_MODE == AMRTEX_MODE_ISO) return true;
   if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION) return r.value_range.x == real(0) && r.value_range.y == real(0);
@@ -61,6 +62,7 @@ void take_sample(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q, IN(real) leng
   if (AMRTEX_ISOVALUES != 0) {
     note_side(a, missing, value, begin, at);
     if (a.crossing) return;  // the surface comes first; this sample is taken again after it
+    if (AMRTEX_OCCLUSION != 0 && a.probing) return;
   }
 #endif
 #if AMRTEX_CPP || AMRTEX_PREINTEGRATED
@@ -94,6 +96,7 @@ void take_constant_samples(INOUT(Accumulation) a, IN(Region) r, IN(real) count, 
     note_side(a, missing, value, begin, begin + way * ray_real(0.5));
     if (a.crossing) return;
     a.before = begin + way * ray_real(count - real(0.5));
+    if (AMRTEX_OCCLUSION != 0 && a.probing) return;
   }
 #endif
   if (missing) return;
@@ -117,7 +120,7 @@ void take_stencil_sample(INOUT(Accumulation) a, IN(Region) r, IN(Stencil) s, IN(
 #if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
   if (AMRTEX_ISOVALUES != 0) {
     note_side(a, false, value, begin, at);
-    if (a.crossing) return;
+    if (a.crossing || (AMRTEX_OCCLUSION != 0 && a.probing)) return;
   }
 #endif
 #if AMRTEX_CPP || AMRTEX_SHADOWS
@@ -162,6 +165,27 @@ STRUCT Front {
 // AMRTEX_BLOCK samples and lie on a grid of 2^-12 of a finest cell, so that sums of cell and
 // fraction are exact and encodings with other regions see the same bits.
 #define AMRTEX_BLOCK 256
+// A ray that a plane cuts begins inside of an interval, and so does one whose intervals are moved: what is left of it is an
+// interval of its own (the head), with a sample in its own middle.
+#define AMRTEX_CUT (AMRTEX_CLIP_PLANES > 0 || AMRTEX_RAY_OFFSET != 0)
+
+ray_real interval_begin(IN(Ray) ray, IN(int) k) {
+  if (AMRTEX_RAY_OFFSET != 0) return ray_real(u_step) * (ray_real(k) + ray_real(ray.phase));
+  return ray_real(u_step) * ray_real(k);
+}
+
+// The first interval that is drawn in full, ...
+int first_interval(IN(Ray) ray) {
+  return AMRTEX_CUT ? max(int(ceil(ray.first / ray_real(u_step) - ray_real(ray.phase))), 0) : 0;
+}
+
+// ... and the one behind the last.
+int full_intervals(IN(Ray) ray) {
+  if (AMRTEX_RAY_OFFSET != 0) return max(int(floor(ray.length / ray_real(u_step) - ray_real(ray.phase))), 0);
+  return int(floor(ray.length / ray_real(u_step)));
+}
+
+ray_real head_end(IN(Ray) ray) { return min(interval_begin(ray, first_interval(ray)), ray.length); }
 #define AMRTEX_QUANTA real(4096)
 #define AMRTEX_QUANTUM real(0.000244140625)
 
@@ -170,16 +194,18 @@ STRUCT LatticeBlock {
   vec3r fraction;  // ... and fraction, in quanta
   vec3r step;      // quanta a sample
   int first;       // its first sample, counted from the ray's entry
+  real phase;      // of the ray
 };
 
 LatticeBlock lattice_block(IN(Ray) ray, IN(int) first) {
   LatticeBlock block;
-  ray_real t = ray_real(u_step) * ray_real(first);
+  ray_real t = interval_begin(ray, first);
   Position anchor = make_position(ray.entry + ray.direction * t);
   block.cell = anchor.cell;
   block.fraction = anchor.fraction * AMRTEX_QUANTA;
   block.step = vec3r(ray.direction) * (u_step * AMRTEX_QUANTA);
   block.first = first;
+  block.phase = ray.phase;
   return block;
 }
 
@@ -262,7 +288,10 @@ vec3r lattice_q(IN(LatticeBlock) block, IN(LatticeFrame) frame, IN(Region) r, IN
 }
 
 // Where sample i of the block lies, or with - 1/2 where its interval begins (units of ray length).
-ray_real lattice_place(IN(LatticeBlock) block, IN(real) i) { return ray_real(u_step) * (ray_real(block.first) + ray_real(i)); }
+ray_real lattice_place(IN(LatticeBlock) block, IN(real) i) {
+  if (AMRTEX_RAY_OFFSET != 0) return ray_real(u_step) * (ray_real(block.first) + ray_real(block.phase) + ray_real(i));
+  return ray_real(u_step) * (ray_real(block.first) + ray_real(i));
+}
 
 #if AMRTEX_CPP || AMRTEX_PREINTEGRATED
 // Points first to next - 1 lie in a region that cannot be seen: no interval between them can, but those before and
@@ -367,6 +396,7 @@ LatticeBlock lattice_point(IN(Ray) ray, IN(int) whole, IN(ray_real) at, OUT(Posi
   block.fraction = p.fraction * AMRTEX_QUANTA;
   block.step = vec3r(0);
   block.first = whole;
+  block.phase = ray.phase;
   return block;
 }
 
@@ -388,36 +418,44 @@ void march_lattice_point(INOUT(Accumulation) a, IN(Ray) ray, IN(int) whole, IN(r
 #endif
 }
 
-// The interval that is left after `whole` full ones.
-void march_lattice_rest(INOUT(Accumulation) a, IN(Ray) ray, IN(int) whole) {
-  ray_real start = ray_real(u_step) * ray_real(whole);
-  real length = real(ray.length - start);
-  if (AMRTEX_PREINTEGRATED) {  // the last full one's end, and the ray's
+// The interval from `start` to `end`, shorter than others: what is left after `whole` full ones, or a head.
+void march_lattice_part(INOUT(Accumulation) a, IN(Ray) ray, IN(int) whole, IN(ray_real) start, IN(ray_real) end) {
+  real length = real(end - start);
+  if (AMRTEX_PREINTEGRATED) {  // the end of the last full one, where there is one, and its own
     int i = 0;
     do {
-      march_lattice_point(a, ray, whole, start, i == 0 ? start : ray.length, i == 0 ? u_step : length);
+      march_lattice_point(a, ray, whole, start, i == 0 ? start : end, i == 0 ? u_step : length);
       i += 1;
     } while (i < 2 && length > real(0));
     return;
   }
   bool left = AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_LEFT;
-  march_lattice_point(a, ray, whole, start, left ? start : (start + ray.length) * ray_real(0.5), length);
+  march_lattice_point(a, ray, whole, start, left ? start : (start + end) * ray_real(0.5), length);
+}
+
+void march_head(IN(Ray) ray, INOUT(Accumulation) a) {
+  ray_real end = head_end(ray);
+  if (AMRTEX_LATTICE == 0 || !(ray.first < end)) return;
+  march_lattice_part(a, ray, first_interval(ray), ray.first, end);
+  a.end_state = AMRTEX_END_NONE;  // the lattice takes the point at its end itself
 }
 
 // Three nested loops (blocks, regions, samples): what is computed in an inner one is paid
 // by every lane of a SIMD group at every turn.
 void march_lattice(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
-  int whole = int(floor(ray.length / ray_real(u_step)));
-  int first = AMRTEX_ISOVALUES == 0 ? 0 : front.next & ~(AMRTEX_BLOCK - 1);
+  int whole = full_intervals(ray);
+  bool begins_later = AMRTEX_ISOVALUES != 0 || AMRTEX_CUT;
+  int first = begins_later ? front.next & ~(AMRTEX_BLOCK - 1) : 0;
   if (first < whole) {
     do {
-      int from = AMRTEX_ISOVALUES == 0 ? 0 : max(front.next - first, 0);
+      int from = begins_later ? max(front.next - first, 0) : 0;
       front.next = first + march_lattice_block(a, lattice_block(ray, first), from, min(whole - first, AMRTEX_BLOCK));
       first += AMRTEX_BLOCK;
     } while (first < whole && !ray_stopped(a));
   }
-  bool rest = AMRTEX_PREINTEGRATED || ray_real(u_step) * ray_real(whole) < ray.length;
-  if (rest && !ray_stopped(a)) march_lattice_rest(a, ray, whole);
+  bool rest = AMRTEX_PREINTEGRATED || interval_begin(ray, whole) < ray.length;
+  rest = rest && first_interval(ray) <= whole;  // else the head was all
+  if (rest && !ray_stopped(a)) march_lattice_part(a, ray, whole, interval_begin(ray, whole), ray.length);
 }
 
 // ---- adaptive: each region is divided into equal intervals of at most `step` of its own cells.
@@ -438,24 +476,37 @@ Position leave_region(IN(Ray) ray, IN(Region) r, IN(ray_real) t, IN(bvec3) throu
   return p;
 }
 
+// The interval of a region that is the i-th to be sampled (from 0.5 on): its middle and its length, in intervals. Where a ray's
+// intervals are moved the first and the last of `count` + 1 are parts of one.
+vec2r interval_at(IN(real) i, IN(real) count, IN(real) phase) {
+  if (AMRTEX_RAY_OFFSET == 0) return vec2r(i, 1);
+  real from = max(i - real(1.5) + phase, real(0));
+  real to = min(i - real(0.5) + phase, count);
+  return vec2r((from + to) * real(0.5), to - from);
+}
+
 // What march_adaptive_region does, with the eight values of one octant at a time.
 real march_adaptive_cell(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(vec3r) dq, IN(real) count, IN(real) interval,
-                         IN(ray_real) begin, IN(real) from) {
+                         IN(ray_real) begin, IN(real) from, IN(real) phase) {
   real i = from;
-  vec3r q = q0 + dq * i;
-  if (i < count) {
+  real last = AMRTEX_RAY_OFFSET != 0 ? count + real(1) : count;
+  vec2r part = interval_at(i, count, phase);
+  vec3r q = q0 + dq * part.x;
+  if (i < last) {
     do {
       ivec3 octant = stencil_octant(q);
       Stencil s;
       fetch_stencil(r, octant, s);
       bool same = true;
       do {
-        take_stencil_sample(a, r, s, octant, q, interval, begin + ray_real(interval * (i - real(0.5))), begin + ray_real(interval * i));
+        ray_real start = begin + ray_real(interval * (part.x - real(0.5) * part.y));
+        take_stencil_sample(a, r, s, octant, q, interval * part.y, start, begin + ray_real(interval * part.x));
         i += real(1);
-        q = q0 + dq * i;
+        part = interval_at(i, count, phase);
+        q = q0 + dq * part.x;
         same = all(equal(stencil_octant(q), octant));
-      } while (same && i < count && !ray_stopped(a));
-    } while (i < count && !ray_stopped(a));
+      } while (same && i < last && !ray_stopped(a));
+    } while (i < last && !ray_stopped(a));
   }
   return i - real(1);
 }
@@ -472,9 +523,9 @@ void march_points(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(vec3r) d
 }
 #endif
 
-// From interval middle `from` on; returns that across a surface, or of the last sample.
+// From interval middle `from` on; returns that across a surface, or of the last sample. `phase`: the ray's.
 real march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(vec3r) direction, IN(real) length, IN(ray_real) begin,
-                           IN(real) from) {
+                           IN(real) from, IN(real) phase) {
   real inverse_width = real(1) / real(r.width);
 #if AMRTEX_CPP || AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE
   if (AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE && !AMRTEX_BY_RANGE) {
@@ -503,15 +554,18 @@ real march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(
   }
 #endif
   if (AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_LEFT) q0 -= dq * real(0.5);
-  if (AMRTEX_CELL_REGIONS && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST) return march_adaptive_cell(a, r, q0, dq, count, interval, begin, from);
+  if (AMRTEX_CELL_REGIONS && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST) return march_adaptive_cell(a, r, q0, dq, count, interval, begin, from, phase);
   real i = from;
-  if (i < count) {
+  real last = AMRTEX_RAY_OFFSET != 0 ? count + real(1) : count;
+  if (i < last) {
     do {
-      vec3r q = q0 + dq * i;
+      vec2r part = interval_at(i, count, phase);
+      vec3r q = q0 + dq * part.x;
       if (AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_LEFT) q = inside_region(r, q);
-      take_sample(a, r, q, interval, begin + ray_real(interval * (i - real(0.5))), begin + ray_real(interval * i));
+      ray_real start = begin + ray_real(interval * (part.x - real(0.5) * part.y));
+      take_sample(a, r, q, interval * part.y, start, begin + ray_real(interval * part.x));
       i += real(1);
-    } while (i < count && !ray_stopped(a));
+    } while (i < last && !ray_stopped(a));
   }
   return i - real(1);
 }
@@ -554,7 +608,7 @@ void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
       more = more && all(greaterThanEqual(p.cell, ivec3(0))) && all(lessThan(p.cell, u_domain_cells));
     } while (skipped && more);
     if (AMRTEX_SKIPS_IN_STAGES && !skipped) open_region(r);
-    if (!skipped && length > ray_real(0)) front.part = march_adaptive_region(a, r, vec3r(f), direction, real(length), front.t, part);
+    if (!skipped && length > ray_real(0)) front.part = march_adaptive_region(a, r, vec3r(f), direction, real(length), front.t, part, ray.phase);
     part = real(0.5);
   } while (more && !ray_stopped(a));
 }
@@ -564,13 +618,38 @@ void march(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
   else march_adaptive(ray, a, front);
 }
 
+#if AMRTEX_CPP || AMRTEX_OCCLUSION
+// Does a ray that begins on a side (-1: on none) meet a surface? Sampled adaptively, as all secondary rays.
+bool meets_surface(INOUT(Accumulation) a, IN(Ray) ray, IN(int) side) {
+  Accumulation probe = empty_accumulation();
+  probe.probing = true;
+  probe.below = side;
+  probe.counted = a.counted;
+  Front front;
+  front.next = 0;
+  front.t = ray_real(0);
+  front.p = make_position(ray.entry);
+  front.part = real(0.5);
+  if (ray.length > ray_real(0)) march_adaptive(ray, probe, front);
+  a.counted = probe.counted;
+  return probe.crossing;
+}
+#endif
+
 #if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
 // The loop over samples stops at each surface, so that none of what a surface costs (bisection,
 // gradient) is inside of it.
-void march_surfaces(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
+void march_surfaces(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front, IN(bool) goes_on) {
   bool more = true;
+  bool at_mirror = false;
   do {
-    march(ray, a, front);
+    if (!at_mirror) march(ray, a, front);
+#if AMRTEX_CPP || AMRTEX_MIRROR
+    if (AMRTEX_MIRROR != 0 && goes_on && !a.crossing && !ray_ended(a)) {
+      at_mirror = true;
+      note_mirror(ray, a);
+    }
+#endif
     more = a.crossing;
     if (a.crossing) draw_surface(ray, a);
     more = more && !surfaces_ended(a) && !ray_ended(a);
@@ -590,19 +669,48 @@ vec4r volume_picture(IN(Accumulation) a) {
   return vec4r(a.maximum < real(-3.4028235e38) ? real(0) : a.maximum, real(0), real(0), real(1));
 }
 
-// The picture's value for one ray.
-vec4r march_ray(IN(Ray) ray, INOUT(Accumulation) a) {
+// A ray, or the part of one before or behind the mirror.
+void march_part(IN(Ray) ray, INOUT(Accumulation) a, IN(bool) goes_on) {
   Front front;
-  front.next = 0;
-  front.t = ray_real(0);
-  front.p = make_position(ray.entry);
+  front.next = first_interval(ray);
+  front.t = ray.first;
+  front.p = make_position(AMRTEX_CUT ? ray.entry + ray.direction * ray.first : ray.entry);
   front.part = real(0.5);
+  if (AMRTEX_CUT) march_head(ray, a);
 #if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
   if (AMRTEX_ISOVALUES != 0) {
-    march_surfaces(ray, a, front);
-    return surface_picture(a);
+    if (!AMRTEX_CUT || !ray_ended(a)) march_surfaces(ray, a, front, goes_on);
+    return;
   }
 #endif
-  march(ray, a, front);
+  if (!AMRTEX_CUT || !ray_ended(a)) march(ray, a, front);
+}
+
+// May what lies behind be left out?
+bool picture_ended(IN(Accumulation) a) {
+#if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
+  if (AMRTEX_ISOVALUES != 0 && surfaces_ended(a)) return true;
+#endif
+  return ray_ended(a);
+}
+
+// The picture's value for one ray.
+vec4r march_ray(IN(Ray) ray, INOUT(Accumulation) a) {
+#if AMRTEX_CPP || AMRTEX_MIRROR
+  for (int i = 0; i < (AMRTEX_MIRROR != 0 ? 2 : 1); ++i) {
+    Ray part = ray;
+    bool goes_on = false;
+    bool drawn = AMRTEX_MIRROR == 0 || (mirrored_part(ray, i, part, goes_on) && !picture_ended(a));
+    a.before = ray_real(0);  // on the mirror, where the part before noted its side
+    a.end_state = AMRTEX_END_NONE;
+    a.end_level = -1;
+    if (drawn) march_part(part, a, goes_on);
+  }
+#else
+  march_part(ray, a, false);
+#endif
+#if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
+  if (AMRTEX_ISOVALUES != 0) return surface_picture(a);
+#endif
   return volume_picture(a);
 }

@@ -1,4 +1,4 @@
-// Camera rays, clipped to the box that is drawn.
+// Camera rays, clipped to the box that is drawn and cut by planes.
 // Ray space: finest cells along each axis; lengths in units of the smallest edge of a
 // finest cell, so that with cubic cells one unit is one cell.
 UNIFORM(ray_vec3, u_eye)             // finest
@@ -12,12 +12,80 @@ UNIFORM(ray_vec3, u_draw_upper)      // finest
 UNIFORM(vec2r, u_picture_size)       // pixels
 UNIFORM(real, u_length_unit)         // world length of one unit of ray length
 
+#if !AMRTEX_CPP
+#ifndef AMRTEX_CLIP_PLANES
+#error AMRTEX_CLIP_PLANES must be defined: how many planes cut what is drawn; 0 leaves them out
+#endif
+#endif
+DEFINE_INT(AMRTEX_CLIP_PLANES)
+#if !AMRTEX_CPP
+#ifndef AMRTEX_RAY_OFFSET
+#error AMRTEX_RAY_OFFSET must be defined: 1 where the intervals of each ray are moved by a number of its own, else 0
+#endif
+#endif
+DEFINE_INT(AMRTEX_RAY_OFFSET)
+#if !AMRTEX_CPP
+#ifndef AMRTEX_MIRROR
+#error AMRTEX_MIRROR must be defined: 2 axis + 1, or + 2 for the upper face, where the drawn box is mirrored; 0 where it is not
+#endif
+#endif
+DEFINE_INT(AMRTEX_MIRROR)
+#if !AMRTEX_CPP
+#ifndef AMRTEX_OCCLUSION
+#error AMRTEX_OCCLUSION must be defined: 1 where isosurfaces take light from one another, else 0
+#endif
+#endif
+DEFINE_INT(AMRTEX_OCCLUSION)
+#define AMRTEX_MIRROR_AXIS ((AMRTEX_MIRROR - 1) / 2)
+#define AMRTEX_MIRROR_UPPER (AMRTEX_MIRROR % 2 == 0)
+
 STRUCT Ray {
   ray_vec3 entry;      // finest: where it enters the drawn box, or the eye inside it
   ray_vec3 direction;  // finest cells a unit of length
   ray_real length;     // units, from entry to exit
   ray_real start;      // units, from where the camera sends it to the entry
+  ray_real first;      // units, from the entry to where drawing begins: 0, or on the plane that cuts it there
+  bool mirrored;       // is it the way through the mirror image, as one through the field?
+  real turn;           // radians by which what is around a hit is turned; of occlusion alone
+  real phase;          // intervals by which the ray's are moved; 0 without offsets
 };
+
+#if AMRTEX_CPP || AMRTEX_CLIP_PLANES > 0
+UNIFORM_ARRAY(ray_real, u_clip_planes, 4 * AMRTEX_CLIP_PLANES, 32)  // a, b, c, d of each: a x + b y + c z >= d is kept; finest
+
+// Cuts a ray that begins at its entry. False where nothing is left. The entry stays, so that samples keep their places.
+bool clip_ray(INOUT(Ray) ray) {
+  for (int i = 0; i < AMRTEX_CLIP_PLANES; ++i) {
+    ray_vec3 normal = ray_vec3(u_clip_planes[4 * i], u_clip_planes[4 * i + 1], u_clip_planes[4 * i + 2]);
+    ray_real height = dot(normal, ray.entry) - u_clip_planes[4 * i + 3];
+    ray_real rise = dot(normal, ray.direction);
+    if (rise == ray_real(0) && height < ray_real(0)) return false;
+    if (rise > ray_real(0)) ray.first = max(ray.first, -height / rise);
+    if (rise < ray_real(0)) ray.length = min(ray.length, -height / rise);
+  }
+  return ray.length > ray.first;
+}
+#endif
+
+#if AMRTEX_CPP || AMRTEX_RAY_OFFSET || AMRTEX_OCCLUSION
+UNIFORM(int, u_ray_seed)
+UNIFORM(int, u_occlusion_seed)
+
+// Chris Wellons' lowbias32: each bit of v changes each of the result with nearly the same chance.
+uint hash_bits(IN(uint) v) {
+  uint h = (v ^ (v >> 16u)) * 0x7feb352du;
+  h = (h ^ (h >> 15u)) * 0x846ca68bu;
+  return h ^ (h >> 16u);
+}
+
+// In (0, 1), the same in every precision: 23 bits and a half.
+real pixel_random(IN(vec2r) pixel, IN(int) seed) {
+  uint h = hash_bits(uint(seed));
+  h = hash_bits(h + uint(int(floor(pixel.x))));
+  h = hash_bits(h + uint(int(floor(pixel.y))));
+  return (real(h >> 9u) + real(0.5)) * real(1.1920928955078125e-7);
+}
+#endif
 
 // False when the pixel's ray misses the box. `pixel`: centre, from the lower left.
 bool camera_ray(IN(vec2r) pixel, OUT(Ray) ray) {
@@ -34,23 +102,70 @@ bool camera_ray(IN(vec2r) pixel, OUT(Ray) ray) {
   ray.entry = origin;
   ray.length = ray_real(0);
   ray.start = ray_real(0);
+  ray.first = ray_real(0);
+  ray.phase = real(0);
+  ray.mirrored = false;
+#if AMRTEX_CPP || AMRTEX_RAY_OFFSET
+  if (AMRTEX_RAY_OFFSET != 0) ray.phase = pixel_random(pixel, u_ray_seed);
+#endif
+  ray.turn = real(0);
+#if AMRTEX_CPP || AMRTEX_OCCLUSION
+  if (AMRTEX_OCCLUSION != 0) ray.turn = pixel_random(pixel, u_occlusion_seed) * real(6.28318530717958648);
+#endif
+  ray_vec3 lower = u_draw_lower;
+  ray_vec3 upper = u_draw_upper;
+  if (AMRTEX_MIRROR != 0) {  // and its image
+    ray_real size = upper[AMRTEX_MIRROR_AXIS] - lower[AMRTEX_MIRROR_AXIS];
+    if (AMRTEX_MIRROR_UPPER) upper[AMRTEX_MIRROR_AXIS] += size;
+    else lower[AMRTEX_MIRROR_AXIS] -= size;
+  }
   for (int axis = 0; axis < 3; ++axis) {
     ray_real o = origin[axis];
     ray_real d = ray.direction[axis];
     if (d == ray_real(0)) {  // parallel to these faces: inside all the way, or never
-      if (o < u_draw_lower[axis] || o > u_draw_upper[axis]) return false;
+      if (o < lower[axis] || o > upper[axis]) return false;
     } else {
-      ray_real t0 = (u_draw_lower[axis] - o) / d;
-      ray_real t1 = (u_draw_upper[axis] - o) / d;
+      ray_real t0 = (lower[axis] - o) / d;
+      ray_real t1 = (upper[axis] - o) / d;
       enter = max(enter, min(t0, t1));
       leave = min(leave, max(t0, t1));
     }
   }
   if (!(leave > enter)) return false;
-  ray.entry = clamp(origin + ray.direction * enter, u_draw_lower, u_draw_upper);
+  ray.entry = clamp(origin + ray.direction * enter, lower, upper);
   ray.length = leave - enter;
   ray.start = enter;
+#if AMRTEX_CPP || AMRTEX_CLIP_PLANES > 0
+  if (AMRTEX_CLIP_PLANES > 0) return clip_ray(ray);
+#endif
   return true;
+}
+
+// A ray from a place inside of what is drawn ends at the latest where that ends.
+void end_where_drawn(INOUT(Ray) ray) {
+  for (int axis = 0; axis < 3; ++axis) {
+    ray_real d = ray.direction[axis];
+    if (d > ray_real(0)) ray.length = min(ray.length, (u_draw_upper[axis] - ray.entry[axis]) / d);
+    if (d < ray_real(0)) ray.length = min(ray.length, (u_draw_lower[axis] - ray.entry[axis]) / d);
+  }
+#if AMRTEX_CPP || AMRTEX_CLIP_PLANES > 0
+  if (AMRTEX_CLIP_PLANES > 0 && !clip_ray(ray)) ray.length = ray_real(0);
+#endif
+  ray.first = ray_real(0);  // it begins where something is drawn, whatever rounding says
+}
+
+// From `entry` (finest), with no length yet.
+Ray secondary_ray(IN(ray_vec3) entry) {
+  Ray ray;
+  ray.entry = entry;
+  ray.direction = ray_vec3(1, 0, 0);
+  ray.length = ray_real(0);
+  ray.start = ray_real(0);
+  ray.first = ray_real(0);
+  ray.mirrored = false;
+  ray.turn = real(0);
+  ray.phase = real(0.5);
+  return ray;
 }
 
 // Splits a point in finest space; faces belong to the upper cell, the domain's last face
@@ -63,3 +178,35 @@ Position make_position(IN(ray_vec3) p) {
   position.fraction = clamp(vec3r(p - whole), vec3r(0), vec3r(AMRTEX_BELOW_ONE));
   return position;
 }
+
+#if AMRTEX_CPP || AMRTEX_MIRROR
+// The first (0) or second (1) part of a ray, as a ray through the drawn box itself: up to where it goes through the mirror, or from
+// there on; what lies in the image is reflected. False where nothing of it is drawn. `goes_on`: does another part follow?
+bool mirrored_part(IN(Ray) ray, IN(int) number, OUT(Ray) part, OUT(bool) goes_on) {
+  ray_real plane = AMRTEX_MIRROR_UPPER ? u_draw_upper[AMRTEX_MIRROR_AXIS] : u_draw_lower[AMRTEX_MIRROR_AXIS];
+  ray_real outward = ray_real(AMRTEX_MIRROR_UPPER ? 1 : -1);
+  ray_real height = (ray.entry[AMRTEX_MIRROR_AXIS] - plane) * outward;
+  ray_real rise = ray.direction[AMRTEX_MIRROR_AXIS] * outward;
+  ray_real fold = rise == ray_real(0) ? ray.length : -height / rise;
+  bool folds = fold > ray_real(0) && fold < ray.length;
+  bool begins_in_image = height > ray_real(0) || (height == ray_real(0) && rise > ray_real(0));
+  part = ray;
+  goes_on = folds && number == 0;
+  if (number == 1 && !folds) return false;
+  ray_real begin = number == 1 ? fold : ray_real(0);
+  if (number == 1) {
+    part.entry = ray.entry + ray.direction * fold;
+    part.entry[AMRTEX_MIRROR_AXIS] = plane;
+  }
+  part.length = (goes_on ? fold : ray.length) - begin;
+  part.start = ray.start + begin;
+  part.first = max(ray.first - begin, ray_real(0));
+  part.mirrored = begins_in_image != (number == 1);
+  if (part.mirrored) {
+    part.entry[AMRTEX_MIRROR_AXIS] = ray_real(2) * plane - part.entry[AMRTEX_MIRROR_AXIS];
+    part.direction[AMRTEX_MIRROR_AXIS] = -ray.direction[AMRTEX_MIRROR_AXIS];
+  }
+  part.entry = clamp(part.entry, u_draw_lower, u_draw_upper);
+  return part.length > part.first;
+}
+#endif

@@ -22,26 +22,18 @@ vec3r safe_inverse(IN(vec3r) v);
 Position leave_region(IN(Ray) ray, IN(Region) r, IN(ray_real) t, IN(bvec3) through);
 #endif
 
-// What lies between a place and the lamp, up to the drawn box: a ray of length 0 where it is at the lamp.
+// What lies between a place and the lamp, up to the drawn box and the planes that cut it: a ray of length 0 where it is at the lamp.
 Ray ray_to_lamp(IN(Position) p) {
-  Ray ray;
-  ray.entry = ray_vec3(p.cell) + ray_vec3(p.fraction);
+  Ray ray = secondary_ray(ray_vec3(p.cell) + ray_vec3(p.fraction));
   ray_vec3 way = (u_lamp - ray.entry) / u_cells_per_unit;
   // scaled first: the square of the way to a far lamp may be no float
   ray_real largest = max(abs(way.x), max(abs(way.y), abs(way.z)));
-  ray.direction = ray_vec3(1, 0, 0);
-  ray.length = ray_real(0);
-  ray.start = ray_real(0);
   if (largest > ray_real(0)) {
     ray_real in_largest = length(way / largest);
     ray.direction = way / largest / in_largest * u_cells_per_unit;
     ray.length = largest * in_largest;
   }
-  for (int axis = 0; axis < 3; ++axis) {
-    ray_real d = ray.direction[axis];
-    if (d > ray_real(0)) ray.length = min(ray.length, (u_draw_upper[axis] - ray.entry[axis]) / d);
-    if (d < ray_real(0)) ray.length = min(ray.length, (u_draw_lower[axis] - ray.entry[axis]) / d);
-  }
+  end_where_drawn(ray);
   return ray;
 }
 

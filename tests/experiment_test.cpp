@@ -404,7 +404,23 @@ TEST(ExperimentErrors, NameKeyAndWhatIsAccepted) {
       {"render", R"({"prune": true, "tolerance": 0.1})", "render.prune:", "integrator tolerance"},
       {"render", R"({"prune": true, "needs": "all"})", "render.prune: needs 'all' keeps", "one of both"},
       {"render", R"({"needs": "some"})", "render.needs", "scene, all"},
-      {"render", R"({"clip_planes": [[1, 0, 0, 0]]})", "render.clip_planes: not available in this version", "early_end"},
+      {"render", R"({"mode": "iso", "isovalues": [1], "ambient_occlusion": {"rays": 4}})", "ambient_occlusion", "radius"},
+      {"render", R"({"mode": "iso", "isovalues": [1], "ambient_occlusion": {"radius": 0}})",
+       "ambient_occlusion.radius:", "above 0"},
+      {"render", R"({"mode": "iso", "isovalues": [1], "ambient_occlusion": {"radius": 1, "rays": 0}})",
+       "rays:", "from 1 to 1024"},
+      {"render", R"({"mode": "iso", "isovalues": [1], "output": "depth", "ambient_occlusion": {"radius": 1}})",
+       "render.ambient_occlusion:", "output color"},
+      {"render", R"({"mirror": "x"})", "render.mirror:", "-x, +x"},
+      {"render", R"({"mirror": "+x", "level_of_detail": 2})", "render.mirror:", "one of both"},
+      {"render", R"({"mirror": "+x", "point_light": [0, 0, 0]})", "render.mirror:", "one of both"},
+      {"render", R"({"ray_offset": 3})", "render.ray_offset:", "true"},
+      {"render", R"({"ray_offset": true, "integrator": "left"})", "render.ray_offset:", "exponential_midpoint and euler"},
+      {"render", R"({"clip_planes": [[1, 0, 0]]})", "render.clip_planes[0]:", "[a, b, c, d]"},
+      {"render", R"({"clip_planes": [1, 0, 0, 0]})", "render.clip_planes", "[a, b, c, d]"},
+      {"render", R"({"clip_planes": [[1, 0, 0, 0], [0, 0, 0, 1]]})",
+       "render.clip_planes: 'clip_planes' plane 1:", "no direction"},
+      {"render", R"({"clip_planes": [[1, 0, "NaN", 0]]})", "render.clip_planes[0][2]:", "number"},
       {"render", R"({"widht": 4})", "render.widht:", "did you mean 'width'?"},
       {"views", "[]", "views:", "empty list"},
       {"views", R"([{"eye": [3, 0, 0], "at": [3, 0, 0]}])", "views[0].eye:", "differ"},
@@ -531,6 +547,20 @@ TEST(Prune, AndNeedsNameTheRecordOnlyWhereTheyAreNotTheDefault) {
   EXPECT_EQ(hash("{}"), hash(R"({"prune": false, "needs": "scene"})"));
   EXPECT_NE(hash("{}"), hash(R"({"prune": true})"));
   EXPECT_NE(hash("{}"), hash(R"({"needs": "all"})"));
+}
+
+TEST(RayOffset, HasTheExperimentsSeedAndStandsInEveryRecord) {
+  const auto parsed = [](bool on) {
+    Json json = Json::parse(with("render", fmt::format(R"({{"mode": "dvr", "ray_offset": {}}})", on)));
+    json["seed"] = 77;
+    return parse_experiment(json.dump(), "e.json").renders.front();
+  };
+  EXPECT_EQ(parsed(true).settings.ray_offset, 77u);
+  EXPECT_EQ(render_json(parsed(true))["ray_offset"], true);
+  EXPECT_EQ(render_json(parsed(true))["seed"], 77);
+  EXPECT_FALSE(parsed(false).settings.ray_offset.has_value());
+  EXPECT_EQ(render_json(parsed(false))["ray_offset"], false);
+  EXPECT_FALSE(render_json(parsed(false)).contains("seed"));
 }
 
 TEST(ExplainError, IsOffUnlessAskedForAndNamesTheRecordOnlyThen) {
