@@ -98,6 +98,9 @@ std::vector<PartRow> part_rows() {
       {"kd_tree", "validity bits", all, "kd_validity", "AMRTEX_VALIDITY", needed, validity},
       {"kd_tree", "value ranges", all, "", "AMRTEX_VALUE_RANGES", unskipped, needed},
       {"kd_tree", "border layer", {nearest}, "", "", needed, border},
+      {"exabricks", "validity bits", all, "exa_validity", "AMRTEX_EXA_MISSING", needed, validity},
+      {"exabricks", "value ranges", all, "exa_ranges", "AMRTEX_VALUE_RANGES", unskipped, needed},
+      {"exabricks", "border layer", {nearest}, "", "AMRTEX_EXA_BORDER", needed, border},
       {"kd_tree", "refined parts of subgrids", all, "kd_detail", "AMRTEX_LEVEL_OF_DETAIL", needed, detail},
   };
 }
@@ -347,6 +350,10 @@ std::int64_t bytes_by_formula(const AmrHierarchy& h, const EncodedField& f) {
   if (f.encoding == "kd_tree")
     return h.leaf_cells() * 4 + n("nodes") * 8 + n("leaves") * 8 + f.find("kd_start")->bytes() +
            f.find("kd_start_nodes")->bytes();
+  // eight words and a range a region, two words a node, an entry and a node of the start grid
+  if (f.encoding == "exabricks")
+    return h.leaf_cells() * 4 + n("regions") * 36 + n("nodes") * 8 + f.find("exa_start")->bytes() +
+           f.find("exa_start_nodes")->bytes();
   throw Error(fmt::format("encoding {}: tell here by formula what it needs", f.encoding));
 }
 

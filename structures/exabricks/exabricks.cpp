@@ -49,13 +49,14 @@ struct Plan {
   std::vector<std::int64_t> leaf_region;  ///< of an item of the BVH; -1: no mesh
   std::vector<std::int64_t> first_piece;  ///< of a region, among those that are stored
   std::int64_t stored_pieces = 0;
-  bool missing = false;  ///< do bricks hold cells without value?
-  Vec3i texel_bits{0};   ///< of a packed texel
+  bool cells_missing = false;  ///< do bricks hold cells without value?
+  bool missing = false;        ///< are there bits that tell so?
+  Vec3i texel_bits{0};         ///< of a packed texel
   std::int64_t validity_words = 0;
   std::int64_t brick_texels = 0;
   std::int64_t brick_cells = 0;
   /// A plain region needs none, but may turn out to have cells without value.
-  bool keeps_pieces(const Options& o, const Region& r) const { return o.hats && !o.cells && (!r.plain || missing); }
+  bool keeps_pieces(const Options& o, const Region& r) const { return o.hats && !o.cells && (!r.plain || cells_missing); }
   std::int64_t regions() const { return static_cast<std::int64_t>(set.regions.size()); }
   std::int64_t bricks() const { return static_cast<std::int64_t>(tree.bricks.size()); }
 };
@@ -182,7 +183,7 @@ class Exabricks final : public Encoding {
         {"traversal", "how the region of a place is found: down the planes from a grid's cell or from the root, or through a BVH",
          "grid", "\"grid\", \"kd\" or \"bvh\""}};
   }
-  void check_parameters(const Json& parameters) const override { options(parameters, Filter::basis); }
+  void check_parameters(const Json& parameters) const override { options(parameters, {.filter = Filter::basis}); }
   Support supported(const ContextInfo&) const override { return {}; }
   Support analytic_gradients(Filter filter) const override {
     return filter == Filter::basis ? Support{} : Support{false, "a value a cell has no derivative"};
@@ -190,7 +191,7 @@ class Exabricks final : public Encoding {
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
-  Options options(const Json& parameters, Filter filter) const;
+  Options options(const Json& parameters, const SceneNeeds& needs) const;
   Plan plan(const AmrHierarchy& h, const BuildRequest& request, const Options& o) const;
   void plan_pool(const BuildRequest& request, const Options& o, Plan& p) const;
   void plan_traversal(const AmrHierarchy& h, const BuildRequest& request, const Options& o, Plan& p) const;
@@ -198,7 +199,7 @@ class Exabricks final : public Encoding {
   void require_sizes(const BuildRequest& request, const Options& o, const Plan& p) const;
 };
 
-Options Exabricks::options(const Json& parameters, Filter filter) const {
+Options Exabricks::options(const Json& parameters, const SceneNeeds& needs) const {
   const auto bad = [&](const char* name, const char* accepted) {
     throw UsageError(
         fmt::format("encoding exabricks: parameter {} is {}; accepted: {}", name, parameters.at(name).dump(), accepted));
@@ -214,9 +215,9 @@ Options Exabricks::options(const Json& parameters, Filter filter) const {
   o.traversal = traversal == "grid" ? Traversal::grid : traversal == "kd" ? Traversal::kd : Traversal::bvh;
   const Json& locate = parameters.at("locate");
   if (locate != "regions" && locate != "cells") bad("locate", R"("regions" or "cells")");
-  o.hats = filter == Filter::basis;
+  o.hats = needs.filter == Filter::basis;
   o.cells = o.hats && locate == "cells";
-  if (!o.hats) o.border = 0;
+  if (!o.hats) o.border = needs.keeps_border() ? 1 : 0;
   return o;
 }
 
@@ -339,12 +340,13 @@ Plan Exabricks::plan(const AmrHierarchy& h, const BuildRequest& request, const O
         fmt::format("encoding exabricks: {} levels, a region tells at most {}", h.level_count(), 1 << AMRTEX_EXA_LEVEL_BITS));
   Plan p;
   p.tree = build_bricks(h, o.brick_width);
-  p.set = build_regions(h, p.tree, {o.border, o.hats, !o.cells});
+  p.set = build_regions(h, p.tree, {o.hats ? o.border : 0, o.hats, !o.cells});
   if (p.set.nodes.size() >= std::size_t{1} << AMRTEX_EXA_CHILD_BITS)
     throw UnsupportedError(fmt::format("encoding exabricks: {} nodes over {} regions, a child's index has {} bits",
                                        p.set.nodes.size(), p.regions(), AMRTEX_EXA_CHILD_BITS));
   for (int number = 0; number < request.field_count(); ++number)
-    p.missing = p.missing || h.statistics(request.field_at(number)).cells_without_value > 0;
+    p.cells_missing = p.cells_missing || h.statistics(request.field_at(number)).cells_without_value > 0;
+  p.missing = p.cells_missing || request.needs.keeps_validity();
   for (const Region& r : p.set.regions) {
     if (r.pieces >= 1 << AMRTEX_EXA_PIECE_BITS)
       throw UnsupportedError(fmt::format("encoding exabricks: {} pieces reach into one region, it tells less than {}", r.pieces,
@@ -654,18 +656,14 @@ Json statistics(const Options& o, const Plan& p) {
 std::vector<LeftOut> left_out(const BuildRequest& request, const Options& o, const Plan& p) {
   std::vector<LeftOut> list;
   if (!p.missing)
-    list.push_back({"validity bits", "every cell has a value", 4 * request.field_count() * words_for_bits(p.packing.texels())});
-  if (!request.needs.value_ranges) list.push_back({"value ranges", "no region is skipped", 4 * p.regions()});
-  if (!o.hats) {
+    list.push_back({"validity bits", "every cell has a value", 4 * request.field_count() * words_for_bits(p.packing.texels()),
+                    Part::validity});
+  if (!request.needs.value_ranges) list.push_back({"value ranges", "no region is skipped", 4 * p.regions(), Part::value_ranges});
+  if (!o.hats && o.border == 0) {
     std::int64_t border = 0;
     for (const Brick& b : p.tree.bricks) border += b.cells.grown(1).cells() - b.cells.cells();
-    list.push_back(
-        {"border layer", "the filter nearest reads one cell", border * request.field_count() * texel_bytes(request.storage)});
-  }
-  if (o.hats && !o.cells && !p.missing) {
-    std::int64_t pieces = 0;
-    for (const Region& r : p.set.regions) pieces += r.plain ? r.pieces : 0;
-    list.push_back({"pieces of plain regions", "their brick's texels give the filter as they stand", 16 * pieces});
+    list.push_back({"border layer", "the filter nearest reads one cell",
+                    border * request.field_count() * texel_bytes(request.storage), Part::border});
   }
   return list;
 }
@@ -674,7 +672,7 @@ EncodedField Exabricks::build(const AmrHierarchy& h, const BuildRequest& request
   require_filter(*this, request.needs.filter);
   require_fields(*this, h, request);
   const Json parameters = complete_parameters(*this, request.parameters);
-  const Options o = options(parameters, request.needs.filter);
+  const Options o = options(parameters, request.needs);
   const Plan p = plan(h, request, o);
 
   EncodedField field = start_field(*this, h, request, parameters);
