@@ -29,6 +29,15 @@ bool region_interval(IN(Ray) ray, IN(Region) r, IN(ray_real) margin, OUT(ray_rea
   return leave > enter;
 }
 
+// The interval from `start` to `end`, shorter than others, where its sample lies in the region.
+void take_box_part(IN(Ray) ray, IN(Region) r, INOUT(Accumulation) a, IN(int) whole, IN(ray_real) start, IN(ray_real) end) {
+  if (!(start < end)) return;
+  Position p;
+  ray_real middle = (start + end) * ray_real(0.5);
+  LatticeBlock part = lattice_point(ray, whole, middle, p);
+  if (region_contains(r, p.cell)) take_lattice_point(a, part, r, start, middle, real(end - start));
+}
+
 // Lattice samples whose cells lie in the region. The interval only tells where to look for the first.
 #define AMRTEX_BOX_MARGIN ray_real(0.00390625)
 void march_lattice_box(IN(Ray) ray, IN(Region) r, INOUT(Accumulation) a) {
@@ -39,7 +48,8 @@ void march_lattice_box(IN(Ray) ray, IN(Region) r, INOUT(Accumulation) a) {
   int from = max(int(floor(enter / ray_real(u_step))) - 2, first_interval(ray));
   int to = min(int(ceil(leave / ray_real(u_step))) + 2, whole);
   int first = from & ~(AMRTEX_BLOCK - 1);
-  if (first < to) {
+  if (AMRTEX_CUT) take_box_part(ray, r, a, first_interval(ray), ray.first, head_end(ray));
+  if (from < to) {
     do {
       LatticeBlock block = lattice_block(ray, first);
       int count = min(whole - first, AMRTEX_BLOCK);
@@ -56,16 +66,8 @@ void march_lattice_box(IN(Ray) ray, IN(Region) r, INOUT(Accumulation) a) {
       first += AMRTEX_BLOCK;
     } while (first < to);
   }
-  for (int i = AMRTEX_CUT ? 0 : 1; i < 2; ++i) {  // the intervals before and behind the full ones
-    ray_real start = i == 0 ? ray.first : interval_begin(ray, whole);
-    ray_real end = i == 0 ? head_end(ray) : ray.length;
-    if (start < end && (i == 0 || first_interval(ray) <= whole)) {
-      Position p;
-      ray_real middle = (start + end) * ray_real(0.5);
-      LatticeBlock part = lattice_point(ray, whole, middle, p);
-      if (region_contains(r, p.cell)) take_lattice_point(a, part, r, start, middle, real(end - start));
-    }
-  }
+  ray_real rest = interval_begin(ray, whole);
+  if (first_interval(ray) <= whole) take_box_part(ray, r, a, whole, rest, ray.length);
 }
 
 void march_adaptive_box(IN(Ray) ray, IN(Region) r, INOUT(Accumulation) a) {

@@ -115,6 +115,24 @@ TEST(Clip, ByObliquePlanesLeavesTheChordBetweenThem) {
   });
 }
 
+TEST(Clip, BoxByBoxIsTheRaycastersPicture) {
+  const AmrHierarchy h = nested(waves).hierarchy();
+  int drawn = 0;
+  for_each_filter([&](const EncodingCase& c) {
+    if (!gives_boxes(h, c) || c.filter == Filter::nearest) return;
+    for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive}) {
+      Scene scene = clip_scene(Mode::dvr, sampling, {kOblique});
+      scene.transfer_function = peaks();
+      const Picture by_ray = draw(context(ContextKind::egl), h, build(h, c), scene);
+      scene.settings.consumer = ConsumerKind::multipass;
+      EXPECT_LE(difference(draw_boxes(h, c, scene), by_ray), 2e-6);
+      EXPECT_GT(largest(by_ray), 0.5);
+      ++drawn;
+    }
+  });
+  EXPECT_GE(drawn, 6);
+}
+
 TEST(Clip, CutsInEveryIntegrator) {
   const AmrHierarchy h = nested(constant(1)).hierarchy();
   const double k = 2;

@@ -53,7 +53,6 @@ TEST(RayOffset, LosesNoLengthOfARay) {
 }
 
 TEST(RayOffset, IsTheSameNumberInDoubleAndOnGl) {
-  // with steps of 1.5 cells another seed is another picture by 1e-2 and more
   const AmrHierarchy h = nested(waves).hierarchy();
   for_each_filter([&](const EncodingCase& c) {
     const EncodedField field = build(h, c);
@@ -65,7 +64,9 @@ TEST(RayOffset, IsTheSameNumberInDoubleAndOnGl) {
       const double bound = c.filter == Filter::nearest ? 2e-2 : 1e-4;  // nearest: a sample on a face may fall to either side
       EXPECT_LE(rms_difference(on_gl, in_double), bound);
       if (c.filter != Filter::nearest) {
-        EXPECT_GT(difference(in_double, render_on_cpu(h, field, offset_scene(Mode::projection, sampling, 4), true)), 1e-3);
+        // another seed is another picture, by far more than the same seed's rounding
+        const Picture other = render_on_cpu(h, field, offset_scene(Mode::projection, sampling, 4), true);
+        EXPECT_GT(rms_difference(in_double, other), 20 * rms_difference(on_gl, in_double));
       }
     }
   });
