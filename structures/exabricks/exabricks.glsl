@@ -319,6 +319,15 @@ real exa_hat_sum(IN(ExaPiece) p, IN(vec3r) x) {
   return product;
 }
 
+// One more value with the sum of its hats into (mean so far, hats so far). Not a sum of products that is divided in the end: that
+// rounds a constant field off its constant, and passes the largest float where values come near it.
+void exa_add_weighted(INOUT(vec2r) mean, IN(real) value, IN(real) hats) {
+  mean.y += hats;
+  real share = hats > real(0) ? hats / mean.y : real(0);
+  PRECISE real shift = (value - mean.x) * share;
+  mean.x += shift;
+}
+
 #if AMRTEX_CPP || AMRTEX_EXA_MISSING
 // Has every cell of the piece whose hat reaches x a value?
 bool exa_all_present(IN(ExaPiece) p, IN(int) field, IN(vec3r) x) {
@@ -334,7 +343,7 @@ bool exa_all_present(IN(ExaPiece) p, IN(int) field, IN(vec3r) x) {
 }
 
 // Adds the piece's hats one by one; those of cells without value are left out.
-void exa_add_present(IN(ExaPiece) p, IN(int) field, IN(vec3r) x, INOUT(vec2r) sums) {
+void exa_add_present(IN(ExaPiece) p, IN(int) field, IN(vec3r) x, INOUT(vec2r) mean) {
   PRECISE vec3r from_centre = x - vec3r(0.5);
   vec3r whole = floor(from_centre);
   PRECISE vec3r f = from_centre - whole;
@@ -347,9 +356,7 @@ void exa_add_present(IN(ExaPiece) p, IN(int) field, IN(vec3r) x, INOUT(vec2r) su
     if (there && exa_has_value(field, p.texel + c)) {
       PRECISE vec3r w = vec3r(corner) * f + vec3r(ivec3(1) - corner) * (vec3r(1) - f);
       PRECISE real hat = w.x * w.y * w.z;
-      PRECISE real part = hat * decode_value(exa_texel(field, p.texel + c), field);
-      sums.x += part;
-      sums.y += hat;
+      exa_add_weighted(mean, decode_value(exa_texel(field, p.texel + c), field), hat);
     }
     k += 1;
   } while (k < 8);
@@ -377,21 +384,17 @@ vec3r exa_piece_position(IN(ExaPiece) p, IN(vec3r) q) {
   return x;
 }
 
-// Adds a piece's hats times their values, and the hats.
-void exa_add_piece(IN(Region) r, IN(ExaPiece) p, IN(int) field, IN(vec3r) q, INOUT(vec2r) sums) {
+void exa_add_piece(IN(Region) r, IN(ExaPiece) p, IN(int) field, IN(vec3r) q, INOUT(vec2r) mean) {
   vec3r x = exa_piece_position(p, q);
 #if AMRTEX_CPP || AMRTEX_EXA_MISSING
   if (AMRTEX_EXA_MISSING != 0 && exa_flag(r, AMRTEX_EXA_MISSING_FLAG)) {
     if (!exa_all_present(p, field, x)) {
-      exa_add_present(p, field, x, sums);
+      exa_add_present(p, field, x, mean);
       return;
     }
   }
 #endif
-  real hats = exa_hat_sum(p, x);
-  PRECISE real part = hats * exa_clamped_value(p, field, x);
-  sums.x += part;
-  sums.y += hats;
+  exa_add_weighted(mean, exa_clamped_value(p, field, x), exa_hat_sum(p, x));
 }
 
 #if AMRTEX_CPP || AMRTEX_EXA_CELLS
@@ -410,22 +413,22 @@ int exa_next_brick(IN(Region) r, IN(vec3r) q, INOUT(int) i) {
   return brick;
 }
 
-// The hats about q after a search from the root, as each sample of Wald et al. 2017 makes it.
-vec2r exa_search_cells(IN(Region) r, IN(int) field, IN(vec3r) q) {
-  vec2r sums = vec2r(0);
+// f at q after a search from the root, as each sample of Wald et al. 2017 makes it.
+real exa_search_cells(IN(Region) r, IN(int) field, IN(vec3r) q) {
+  vec2r mean = vec2r(0);
   int i = 0;
   do {
     int brick = exa_next_brick(r, q, i);
-    if (brick >= 0) exa_add_piece(r, exa_brick(r, brick), field, q, sums);
+    if (brick >= 0) exa_add_piece(r, exa_brick(r, brick), field, q, mean);
   } while (i != 0);
-  return sums;
+  return mean.x;
 }
 #endif
 
 #if AMRTEX_CPP || (AMRTEX_FILTER == AMRTEX_FILTER_BASIS && !AMRTEX_EXA_CELLS)
 // `own`: what the texels of the region's brick say at q.
-vec2r exa_sum_pieces(IN(Region) r, IN(int) field, IN(vec3r) q, IN(real) own) {
-  vec2r sums = vec2r(0);
+real exa_mean_of_pieces(IN(Region) r, IN(int) field, IN(vec3r) q, IN(real) own) {
+  vec2r mean = vec2r(0);
   int i = r.handle.z;
   int end = i + (r.handle.w & ((1 << AMRTEX_EXA_PIECE_BITS) - 1));
   bool reads_own = exa_flag(r, AMRTEX_EXA_OWN_FLAG);
@@ -433,23 +436,21 @@ vec2r exa_sum_pieces(IN(Region) r, IN(int) field, IN(vec3r) q, IN(real) own) {
   if (reads_own && AMRTEX_EXA_MISSING != 0 && exa_flag(r, AMRTEX_EXA_MISSING_FLAG)) {
     ExaPiece marked = exa_piece(r, i);
     reads_own = exa_all_present(marked, field, exa_piece_position(marked, q));
-    if (reads_own && i + 1 == end) return vec2r(own, real(1));  // what a plain region without the mark has, to the bit
+    if (reads_own && i + 1 == end) return own;  // what a plain region without the mark has, to the bit
   }
 #endif
   if (reads_own) {
     ExaPiece first = exa_piece(r, i);
-    sums.y = exa_hat_sum(first, exa_piece_position(first, q));
-    PRECISE real part = sums.y * own;
-    sums.x = part;
+    exa_add_weighted(mean, own, exa_hat_sum(first, exa_piece_position(first, q)));
     i += 1;
   }
   if (i < end) {
     do {
-      exa_add_piece(r, exa_piece(r, i), field, q, sums);
+      exa_add_piece(r, exa_piece(r, i), field, q, mean);
       i += 1;
     } while (i < end);
   }
-  return sums;
+  return mean.x;
 }
 #endif
 
@@ -468,24 +469,15 @@ real exa_basis_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
   if (AMRTEX_EXA_MISSING != 0 && exa_flag(r, AMRTEX_EXA_MISSING_FLAG) && !exa_own_cell_has_value(r, field, q)) return no_value();
 #endif
 #if AMRTEX_CPP
-  if (AMRTEX_EXA_CELLS != 0) {
-    vec2r found = exa_search_cells(r, field, q);
-    return found.x * (real(1) / found.y);
-  }
+  if (AMRTEX_EXA_CELLS != 0) return exa_search_cells(r, field, q);
 #elif AMRTEX_EXA_CELLS
-  vec2r found = exa_search_cells(r, field, q);
-  PRECISE real searched = found.x * (real(1) / found.y);
-  return searched;
+  return exa_search_cells(r, field, q);
 #endif
 #if AMRTEX_CPP || (AMRTEX_FILTER == AMRTEX_FILTER_BASIS && !AMRTEX_EXA_CELLS)
   // one fetch for all lanes of a SIMD group: most need nothing else
   real value = real(0);
   if (r.handle.w == 0 || exa_flag(r, AMRTEX_EXA_OWN_FLAG)) value = exa_plain_value(r, field, q);
-  if (r.handle.w != 0) {
-    vec2r sums = exa_sum_pieces(r, field, q, value);
-    PRECISE real quotient = sums.x * (real(1) / sums.y);
-    value = quotient;
-  }
+  if (r.handle.w != 0) value = exa_mean_of_pieces(r, field, q, value);
   return value;
 #endif
 }
