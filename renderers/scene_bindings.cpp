@@ -327,51 +327,8 @@ constexpr double kLongestInterval = 8;
 /// Error that one interval may have: a smaller tolerance needs more of them, so each gets a smaller part. Errors of
 /// intervals cancel in part, and corrected ones are smaller than estimated; the factor is measured (experiments/tolerance).
 double interval_error(double tolerance) { return 1.2 * std::pow(tolerance, 1.25); }
-/// How much the optical depth of a cell may differ from that of the next one for an interval of one cell. A picture's error goes
-/// with the square of the intervals, these with the third root; factor and power are measured (experiments/tolerance).
-/// Where extinction rises and falls by several times what it spans, second differences along a ray go with the square of that.
-double cell_variation(double tolerance, const TransferFunction& tf) {
-  double turns = 0;
-  double most = tf.extinction.front().extinction;
-  double least = most;
-  for (std::size_t i = 1; i < tf.extinction.size(); ++i) {
-    turns += std::abs(tf.extinction[i].extinction - tf.extinction[i - 1].extinction);
-    most = std::max(most, tf.extinction[i].extinction);
-    least = std::min(least, tf.extinction[i].extinction);
-  }
-  turns = std::isfinite(turns) && most > least ? turns / (most - least) : 1;
-  return 1400 * std::pow(tolerance, 1.7) / (turns * turns);
-}
 /// Part of the tolerance that a ray may leave behind it.
 constexpr double kToleranceLeft = 0.1;
-
-/// Is every straight stretch of a curve that is not level at least `least` wide on the axis? `numbers` are the curve's at a
-/// point.
-template <class Points, class Numbers>
-bool has_wide_stretches(const Points& points, const TransferFunction& tf, double least, const Numbers& numbers) {
-  const auto same = [](double a, double b) { return std::abs(a - b) <= 1e-6 * std::max(std::abs(a), std::abs(b)); };
-  Vec3d slope(0);
-  double width = std::numeric_limits<double>::infinity();  // of the stretch so far; points on one line do not divide it
-  for (std::size_t i = 1; i < points.size(); ++i) {
-    const double part = tf.axis(points[i].value) - tf.axis(points[i - 1].value);
-    const Vec3d here = (numbers(points[i]) - numbers(points[i - 1])) / part;
-    const bool goes_on = same(here.x, slope.x) && same(here.y, slope.y) && same(here.z, slope.z);
-    if (!goes_on && slope != Vec3d(0) && width < least) return false;
-    width = goes_on ? width + part : part;
-    slope = here;
-  }
-  return slope == Vec3d(0) || width >= least;
-}
-
-/// Is every stretch of the transfer function over which light changes at least a tenth of the field's values wide? Then samples a
-/// few cells apart see all of it, and intervals follow from value ranges (tolerance.glsl).
-bool is_wide(const TransferFunction& tf, const EncodedField& field) {
-  constexpr double kWide = 0.1;
-  const double lowest = tf.logarithmic ? std::max(field.range_origin, tf.extinction.front().value / 10) : field.range_origin;
-  const double least = kWide * (tf.axis(std::max(field.greatest, lowest)) - tf.axis(lowest));
-  return has_wide_stretches(tf.extinction, tf, least, [](const auto& p) { return Vec3d(p.extinction, 0, 0); }) &&
-         has_wide_stretches(tf.color, tf, least, [](const auto& p) { return p.rgb; });
-}
 
 void add_integrator(const Scene& scene, const EncodedField& field, double unit, SceneBindings& b) {
   const RenderSettings& s = scene.settings;
@@ -381,13 +338,11 @@ void add_integrator(const Scene& scene, const EncodedField& field, double unit, 
   if (by_tolerance || s.integrator == Integrator::preintegrated)
     b.defines.emplace_back("AMRTEX_KNOTS", add_knots(scene.transfer_function, unit, b));
   if (!by_tolerance) return;
-  b.defines.emplace_back("AMRTEX_WIDE_TRANSFER", is_wide(scene.transfer_function, field) ? 1 : 0);
   if (field.definition.filter == Filter::nearest)
     throw UnsupportedError(
         "integrator tolerance: the filter nearest jumps from cell to cell, which no interval follows; accepted "
         "are linear_lod, linear_page, linear_vertex, basis");
   b.uniforms.push_back({"u_interval_error", std::vector<double>{interval_error(s.tolerance)}});
-  b.uniforms.push_back({"u_cell_variation", std::vector<double>{cell_variation(s.tolerance, scene.transfer_function)}});
   b.uniforms.push_back({"u_longest", std::vector<double>{kLongestInterval}});
 }
 

@@ -528,17 +528,13 @@ real march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(
                            IN(real) from, IN(real) phase) {
   real inverse_width = real(1) / real(r.width);
 #if AMRTEX_CPP || AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE
-  if (AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE && !AMRTEX_BY_RANGE) {
+  if (AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE) {
     march_tolerance_region(a, r, f * inverse_width, direction * inverse_width, length, AMRTEX_EARLY_END != 0 ? u_early_end : real(0));
     return from;
   }
 #endif
   // a float counts to 2^24: the host refuses smaller steps, and no loop is endless
-  real count = ceil(length * inverse_width / u_step - real(1e-4));
-#if AMRTEX_CPP || AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE
-  if (AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE) count = range_intervals(a, r, length);
-#endif
-  count = clamp(count, real(1), real(16777216));
+  real count = clamp(ceil(length * inverse_width / u_step - real(1e-4)), real(1), real(16777216));
   real interval = length / count;
   if (AMRTEX_CONSTANT_REGIONS) {
     ray_real first = begin + ray_real(interval * (from - real(0.5)));

@@ -1,22 +1,6 @@
-// The integrator that chooses its intervals, so that a channel of a pixel is off by no more than what was asked. Two rules,
-// of which the host takes the one for the transfer function.
-//
-// By value range: where the function is wide, each region has as many equal intervals of one sample each as its value range
-// asks for. Nothing is estimated on the way, so that a sample costs what one of a fixed step does.
-//
-// By estimate: an interval is the two pre-integrated halves between three samples. How far the middle one is off the line between the
+// The integrator that chooses its intervals, so that a channel of a pixel is off by no more than what was asked.
+// An interval is the two pre-integrated halves between three samples. How far the middle one is off the line between the
 // ends says what the halves are still off (a parabola through the three), and corrects them.
-#if !AMRTEX_CPP
-#ifndef AMRTEX_WIDE_TRANSFER
-#error AMRTEX_WIDE_TRANSFER must be defined: 1 where the transfer function has no narrow stretch, else 0
-#endif
-#endif
-DEFINE_INT(AMRTEX_WIDE_TRANSFER)
-
-// Beside cells without value intervals must be short whatever the range.
-#define AMRTEX_BY_RANGE (AMRTEX_WIDE_TRANSFER != 0 && AMRTEX_VALUE_RANGES != 0 && AMRTEX_VALIDITY == 0)
-
-UNIFORM(real, u_cell_variation)  // by range: see range_intervals
 UNIFORM(real, u_interval_error)  // that one interval may have
 UNIFORM(real, u_longest)         // interval, in cell widths of the region
 
@@ -48,20 +32,6 @@ real light_variation(IN(real) low, IN(real) high) {
     i += 1;
   } while (i < last && knot(i, 0) <= high);
   return rises + most * min(colors, real(1));
-}
-
-// A range is taken to be gone through within so many cells of its region, however large that is.
-#define AMRTEX_SPREAD real(16)
-
-// How many intervals a region has by its value range, over `length` of the ray. The midpoint rule is off by a share of the length
-// that goes with h^2 times how fast light varies there, g; with least samples for the same sum if h goes with g^(-1/3).
-real range_intervals(IN(Accumulation) a, IN(Region) r, IN(real) length) {
-  real width = real(r.width);
-  vec3r cells = vec3r(r.upper - r.lower) / width;
-  real across = min(max(cells.x, max(cells.y, cells.z)), AMRTEX_SPREAD);
-  real variation = light_variation(interval_end(r.value_range.x), interval_end(r.value_range.y)) * width / across;
-  real a_cell = pow(variation * a.transmittance / u_cell_variation + real(1e-30), real(1) / real(3));
-  return ceil(length / width * a_cell);
 }
 
 // Colour, optical depth and estimated error of an interval.

@@ -164,7 +164,6 @@ EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy
   }
   const bool scaled = request.storage != Storage::r32f && request.storage != Storage::r64f;
   field.range_origin = range_origin(s, request.storage, field.scale);
-  field.greatest = s.max;
   field.shader.file = fmt::format("{0}/{0}.glsl", encoding.name());
   field.shader.defines = {{"AMRTEX_FILTER", static_cast<int>(request.needs.filter)},
                           {"AMRTEX_HARDWARE_FILTERING", field.filtering == Filtering::hardware ? 1 : 0},

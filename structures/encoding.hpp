@@ -136,7 +136,6 @@ struct EncodedField {
   StorageScale scale;                     ///< of the first field
   std::vector<StorageScale> more_scales;  ///< of the others
   double range_origin = 0;                ///< what coded value ranges are relative to (build_tools.hpp)
-  double greatest = 0;                    ///< value of the drawn field; NaN where it has none
   ShaderPart shader;
   std::vector<HostTexture> textures;
   std::vector<std::pair<std::string, Vec3i>> integer_uniforms;  ///< ivec3 uniforms of the encoding's GLSL

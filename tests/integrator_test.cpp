@@ -354,7 +354,7 @@ TEST(Tolerance, IsReachedByNinetyFivePixelsOfAHundredWithFewerSamplesThanAnyStep
   }
 }
 
-/// The first is wide: intervals by value range; the second narrow: by estimate (shaders/tolerance.glsl).
+/// A wide one, and one of narrow peaks.
 struct Curve {
   const char* name;
   TransferFunction light;
@@ -383,7 +383,7 @@ void expect_reached(const AmrHierarchy& h, const EncodedField& field, Scene scen
 }
 
 TEST(Tolerance, IsReachedByEveryStructureWithWideAndNarrowCurves) {
-  // the second mesh, field and view are of no scene that the rules were calibrated with
+  // the second mesh, field and view are of no scene that the rule was calibrated with
   struct Case {
     const char* mesh;
     View view;
