@@ -21,7 +21,7 @@ constexpr int kLeastCoarseEdge = 64;  ///< pixels
 constexpr int kCoarseFrames = 3;
 constexpr double kCoarseSlack = 1.3;         ///< a structure is dropped where its small picture misses the tolerance by more
 constexpr std::size_t kCoarseShapes = 8;     ///< structures tried with all storages and filterings
-constexpr std::size_t kCoarseBuilds = 8;     ///< structures drawn with all steps
+constexpr std::size_t kCoarseBuilds = 12;    ///< structures drawn with all steps
 constexpr std::size_t kCarefulSettings = 8;  ///< settings measured at full size, at a time
 constexpr int kCarefulRounds = 3;
 constexpr double kAlike = 1.1;  ///< ratios of times and bytes below it are not told
@@ -230,7 +230,11 @@ class Search {
 
   /// The fastest of each encoding and filter, then the fastest of all.
   std::vector<BuildPoint> fastest_builds(std::vector<MeasuredCandidate> all, std::size_t most) {
-    std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.frame_ms < b.frame_ms; });
+    // those within the slack alone come after those that reach the tolerance
+    std::sort(all.begin(), all.end(), [&](const auto& a, const auto& b) {
+      const bool a_misses = a.error > request_.tolerance, b_misses = b.error > request_.tolerance;
+      return a_misses != b_misses ? b_misses : a.frame_ms < b.frame_ms;
+    });
     std::set<std::pair<std::string, Filter>> seen;
     std::vector<MeasuredCandidate> order, others;
     for (const MeasuredCandidate& m : all)

@@ -513,7 +513,9 @@ TEST(SeveralFields, EachHasTheBitsOfAStructureOfItsOwnOnTheCpu) {
 
 TEST(SeveralFields, EachHasTheBitsOfAStructureOfItsOwnOnGl) {
   Context& gl = context(ContextKind::egl);
+  // on the mesh whose fields miss cells; the same text is asked on all of them above
   for_each_case_of_two_fields([&](const AmrHierarchy& h, const EncodingCase& c) {
+    if (&h != &meshes_of_two_fields()[1].hierarchy) return;
     const auto positions = probe_positions(h, 40);
     const bool scaled = c.filter == Filter::nearest;  // either storage is compiled in some case
     const Storage storage = scaled ? Storage::r16 : Storage::r32f;
@@ -569,6 +571,7 @@ TEST(SeveralFields, ThePictureIsThatOfTheFirstAlone) {
     SCOPED_TRACE(c.name());
     if (!accepted(h, c, {.more_fields = {1}})) continue;
     for (const Mode mode : {Mode::dvr, Mode::mip}) {
+      if (mode == Mode::mip && c.filter != Filter::nearest) continue;  // the other marching loop: it knows no filter
       const Scene scene = askew(h, mode);
       const auto draw = [&](const EncodedField& field) {
         const GpuField gpu(field, gl);

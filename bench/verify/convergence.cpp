@@ -363,15 +363,16 @@ void isosurfaces(VerifyContext& v) {
     if (c.filter == Filter::nearest) return NotAsked{kStairs};
     return order_near(inside(c, Output::normal), 2);
   });
-  // a filter whose values are of order 1 at a boundary has no order left for their differences
+  // a filter whose values jump at a boundary has no order left for their differences
+  const auto is_continuous = [](const EncodingCase& c) { return c.filter == Filter::linear_vertex || c.filter == Filter::basis; };
   v.for_each_filter("24 gradient at a level boundary, direction", [&](const EncodingCase& c) -> Verdict {
-    if (c.filter != Filter::linear_vertex) return NotAsked{"its values are of order 1 at level boundaries, see the control"};
+    if (!is_continuous(c)) return NotAsked{"its values jump at level boundaries, see the control"};
     return order_at_least(at_boundary(c, Output::normal), 1);
   });
-  v.for_each_filter("24 control: gradient at a level boundary, filters with values of order 1 there",
+  v.for_each_filter("24 control: gradient at a level boundary, filters whose values jump there",
                     [&](const EncodingCase& c) -> Verdict {
                       if (c.filter == Filter::nearest) return NotAsked{kStairs};
-                      if (c.filter == Filter::linear_vertex) return NotAsked{"its values are of order 2"};
+                      if (is_continuous(c)) return NotAsked{"its values do not jump"};
                       return order_below(at_boundary(c, Output::normal), 0.9);
                     });
   v.for_each_filter("25 control: isosurface of nearest, position", [&](const EncodingCase& c) -> Verdict {
