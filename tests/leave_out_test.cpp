@@ -100,7 +100,7 @@ std::vector<PartRow> part_rows() {
       {"kd_tree", "border layer", {nearest}, "", "", needed, border},
       {"exabricks", "validity bits", all, "exa_validity", "AMRTEX_EXA_MISSING", needed, validity},
       {"exabricks", "value ranges", all, "exa_ranges", "AMRTEX_VALUE_RANGES", unskipped, needed},
-      {"exabricks", "border layer", {nearest}, "", "AMRTEX_EXA_BORDER", needed, border},
+      {"exabricks", "border layer", {nearest}, "", "", needed, border},
       {"kd_tree", "refined parts of subgrids", all, "kd_detail", "AMRTEX_LEVEL_OF_DETAIL", needed, detail},
   };
 }
