@@ -579,37 +579,33 @@ void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
   bool more = true;
   do {
     Region r;
-    ray_vec3 f = ray_vec3(0);  // as exact as the ray: in a large region a float would lose whole finest cells
     ray_real length = ray_real(0);
     bool skipped = true;
     do {  // the next region that can be seen: all lanes of a SIMD group then sample together
       bool inside = march_locate(a, p, r);
       front.t = t;
       front.p = p;
-      f = ray_vec3(p.cell - r.lower) + ray_vec3(p.fraction);
-      ray_vec3 size = ray_vec3(r.upper - r.lower);
-      ray_vec3 ahead = ray_vec3(forward.x ? size.x - f.x : f.x, forward.y ? size.y - f.y : f.y, forward.z ? size.z - f.z : f.z);
+      // Where the ray meets a face follows from ray and face alone: whatever lies before it, one hidden region or many, the next
+      // region is entered at the same place to the bit, and lengths sum to the chord.
+      ray_vec3 lower = ray.entry - ray_vec3(r.lower);
+      ray_vec3 upper = ray_vec3(r.upper) - ray.entry;
+      ray_vec3 ahead = ray_vec3(forward.x ? upper.x : lower.x, forward.y ? upper.y : lower.y, forward.z ? upper.z : lower.z);
       ray_vec3 exits = ahead * inverse + still;
-      bool x = exits.x <= min(exits.y, exits.z);
-      bool y = !x && exits.y <= exits.z;
-      length = max(x ? exits.x : (y ? exits.y : exits.z), ray_real(0));
-      // Where the ray meets that face follows from ray and face alone, and is no sum of lengths: whatever lies before it, one hidden
-      // region or many, the next region is entered at the same place to the bit.
-      ray_vec3 behind = ray.entry - ray_vec3(r.lower);
-      ray_vec3 before = ray_vec3(r.upper) - ray.entry;
-      ray_vec3 faces = ray_vec3(forward.x ? before.x : behind.x, forward.y ? before.y : behind.y, forward.z ? before.z : behind.z) * inverse;
-      ray_real next = max(x ? faces.x : (y ? faces.y : faces.z), t);
+      ray_real next = max(min(exits.x, min(exits.y, exits.z)), t);
       more = next < ray.length;
-      if (!more) length = max(ray.length - t, ray_real(0));
+      length = max((more ? next : ray.length) - t, ray_real(0));
       skipped = !inside || region_invisible(a, r);
       count_region(a, skipped);
       if (skipped) pass_region(a, inside, r, next);
       t = next;
+      bool x = exits.x <= min(exits.y, exits.z);
+      bool y = !x && exits.y <= exits.z;
       p = leave_region(ray, r, t, bvec3(x, y, !x && !y));
       more = more && all(greaterThanEqual(p.cell, ivec3(0))) && all(lessThan(p.cell, u_domain_cells));
     } while (skipped && more);
     if (AMRTEX_SKIPS_IN_STAGES && !skipped) open_region(r);
-    if (!skipped && length > ray_real(0)) front.part = march_adaptive_region(a, r, vec3r(f), direction, real(length), front.t, part, ray.phase);
+    vec3r f = vec3r(ray_vec3(front.p.cell - r.lower) + ray_vec3(front.p.fraction));  // as exact as the ray before it is rounded
+    if (!skipped && length > ray_real(0)) front.part = march_adaptive_region(a, r, f, direction, real(length), front.t, part, ray.phase);
     part = real(0.5);
   } while (more && !ray_stopped(a));
 }

@@ -419,8 +419,10 @@ TEST(LevelOfDetail, TheContextDrawsWhatTheTextComputesWithFewerSamples) {
     WorkCounts coarse, fine;
     const Scene pruned = scene_of(h, 4.0);
     const Picture picture = draw(gl, h, field, pruned, &coarse);
-    // rays are floats here and doubles there: under nearest a sample may fall on the other side of a face
-    EXPECT_LT(rms(picture, render_on_cpu(h, field, pruned, false)), 1e-3);
+    // rays are floats here and doubles there. A ray through opposite faces of a region has samples in faces of its cells, which
+    // nearest takes on either side
+    const double bound = c.filter == Filter::nearest ? 3e-3 : 1e-4;
+    EXPECT_LT(rms(picture, render_on_cpu(h, field, pruned, false)), bound);
     const Picture whole = draw(gl, h, field, scene_of(h, 0.0), &fine);
     EXPECT_LT(coarse.samples, fine.samples);
     EXPECT_EQ(whole.values, draw(gl, h, build(h, c), scene_of(h, std::nullopt)).values) << "off and a threshold of nothing";
