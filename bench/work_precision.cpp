@@ -159,10 +159,10 @@ std::vector<Goal> goals_of(const Question& question, const std::vector<CostPoint
   return goals;
 }
 
-/// Only points of the dense encoding.
-std::vector<CostPoint> dense_points(const Records& records, std::vector<CostPoint> points) {
+/// Only points of one encoding.
+std::vector<CostPoint> points_of(const Records& records, const std::string& encoding, std::vector<CostPoint> points) {
   for (std::size_t i = 0; i < points.size(); ++i)
-    if (records[i]->at("encoding") != "uniform") points[i] = {kNotMeasured, kNotMeasured};
+    if (records[i]->at("encoding") != encoding) points[i] = {kNotMeasured, kNotMeasured};
   return points;
 }
 
@@ -185,7 +185,7 @@ Table fastest_table(const Scene& scene, const Question& question) {
                                     "time / dense: over that of the fastest setting of `uniform` that reaches the same"};
   for (const Goal& goal : goals_of(question, psnr, p95)) {
     const auto fastest = fastest_within(*goal.points, goal.bound);
-    const auto dense_only = dense_points(scene.records, *goal.points);
+    const auto dense_only = points_of(scene.records, "uniform", *goal.points);
     const auto dense = fastest_within(dense_only, goal.bound);
     asked.emplace_back(goal.text);
     rows.push_back(fastest ? scene.records[*fastest] : nullptr);
@@ -211,6 +211,43 @@ Table front_table(const Scene& scene, const Question& question) {
   table.constants.emplace(table.constants.begin(), "renderer", renderer_of(scene));
   table.notes.push_back(what_error(question, scene.records));
   table.notes.push_back(fmt::format("{} of {} points", rows.size(), scene.records.size()));
+  return table;
+}
+
+/// Encodings in the order of their first record.
+std::vector<std::string> encodings_of(const Records& records) {
+  std::vector<std::string> names;
+  for (const Json* record : records)
+    if (const std::string name = text_at(*record, "/encoding"); std::find(names.begin(), names.end(), name) == names.end())
+      names.push_back(name);
+  return names;
+}
+
+/// The time of the fastest setting of one encoding for each error; nothing where none of its settings reaches it.
+std::vector<Cell> fastest_times(const Scene& scene, const Question& question, const std::string& encoding) {
+  const auto psnr = points_of(scene.records, encoding, cost_points(scene.records, question));
+  const auto p95 = points_of(scene.records, encoding, p95_points(scene.records, question));
+  std::vector<Cell> times;
+  for (const Goal& goal : goals_of(question, psnr, p95)) {
+    const auto fastest = fastest_within(*goal.points, goal.bound);
+    times.push_back(fastest ? Cell((*goal.points)[*fastest].time) : Cell());
+  }
+  return times;
+}
+
+Table encodings_table(const Scene& scene, const Question& question) {
+  Table table{fmt::format("{}: the fastest setting of each encoding, frame, wall (ms), {}", question.title, scene.name),
+              {{"renderer", renderer_of(scene)}},
+              {what_error(question, scene.records)},
+              {{"encoding", "encoding", "", false}},
+              {}};
+  const std::vector<CostPoint> none;
+  for (const Goal& goal : goals_of(question, none, none)) table.columns.push_back({goal.text, goal.text, "ms", true});
+  for (const std::string& encoding : encodings_of(scene.records)) {
+    std::vector<Cell> row = fastest_times(scene, question, encoding);
+    row.insert(row.begin(), encoding);
+    table.rows.push_back(std::move(row));
+  }
   return table;
 }
 
@@ -373,6 +410,7 @@ WorkPrecision make_work_precision(const std::filesystem::path& path, std::span<c
     for (const Scene& scene : scenes_of(records, question)) {
       result.tables.push_back(fastest_table(scene, question));
       result.tables.push_back(front_table(scene, question));
+      result.tables.push_back(encodings_table(scene, question));
       if (auto table = unmeasured_table(scene, question)) result.tables.push_back(std::move(*table));
       result.diagrams.push_back({unused_name("work_precision_" + slug(scene.name), names), diagram(scene, question)});
     }

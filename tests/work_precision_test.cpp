@@ -122,7 +122,7 @@ const std::vector<Json>& four_settings() {
 TEST_F(WorkPrecisionTest, NamesTheFastestSettingForEachErrorAndWhatADenseOneTakes) {
   // dense: 8 ms reach 30 and 40 dB, 30 ms reach 50 and 60 dB
   const WorkPrecision result = made(four_settings());
-  ASSERT_THAT(result.tables, SizeIs(2));
+  ASSERT_THAT(result.tables, SizeIs(3));
   const Table& table = result.tables[0];
   EXPECT_EQ(table.title, "work-precision: the fastest setting, shell, front, ramp, dvr");
   EXPECT_THAT(cells(table, "asked"), ElementsAre("30 dB", "40 dB", "50 dB", "60 dB"));
@@ -149,6 +149,16 @@ TEST_F(WorkPrecisionTest, ShowsTheFrontInTheOrderOfTime) {
   const Table table = made(four_settings()).tables[1];
   EXPECT_THAT(cells(table, "wall"), ElementsAre("3 ± 0", "4 ± 0", "30 ± 0"));
   EXPECT_THAT(table.notes, Contains("3 of 5 points"));
+}
+
+TEST_F(WorkPrecisionTest, ShowsWhatEachEncodingNeedsForEachError) {
+  const Table table = made(four_settings()).tables[2];
+  EXPECT_THAT(cells(table, "encoding"), ElementsAre("uniform", "kd_tree"));
+  EXPECT_THAT(cells(table, "30 dB"), ElementsAre("8", "3"));
+  EXPECT_THAT(cells(table, "40 dB"), ElementsAre("8", "4"));
+  EXPECT_THAT(cells(table, "60 dB"), ElementsAre("30", "40"));
+  const Table beyond = made(four_settings(), R"([{"work_precision": {"reach": [70]}}])").tables[2];
+  EXPECT_THAT(cells(beyond, "70 dB"), ElementsAre("–", "–"));
 }
 
 TEST_F(WorkPrecisionTest, CountsAnExactPictureAsReachingEverything) {
@@ -186,10 +196,10 @@ TEST_F(WorkPrecisionTest, KeepsWhatWasNotMeasuredInSight) {
     records.push_back(not_measured(record({"octree", "r32f", step, 1, 0}), Status::unsupported, "no such filter"));
   records.push_back(not_measured(record({"kd_tree", "r16", 1, 1, 0}), Status::failed, "wrong picture"));
   const WorkPrecision result = made(records);
-  ASSERT_THAT(result.tables, SizeIs(3));
-  EXPECT_THAT(cells(result.tables[2], "encoding"), ElementsAre("kd_tree", "octree"));
-  EXPECT_THAT(cells(result.tables[2], "reason"), ElementsAre("wrong picture", "no such filter"));
-  EXPECT_THAT(cells(result.tables[2], "points"), ElementsAre("1", "2"));
+  ASSERT_THAT(result.tables, SizeIs(4));
+  EXPECT_THAT(cells(result.tables[3], "encoding"), ElementsAre("kd_tree", "octree"));
+  EXPECT_THAT(cells(result.tables[3], "reason"), ElementsAre("wrong picture", "no such filter"));
+  EXPECT_THAT(cells(result.tables[3], "points"), ElementsAre("1", "2"));
   const Json plots = result.diagrams[0].specification["vconcat"];
   EXPECT_THAT(plots[0]["data"]["values"], SizeIs(5));
   EXPECT_THAT(plots[1].dump(), HasSubstr("2 x octree unsupported: no such filter"));
