@@ -214,12 +214,9 @@ Table front_table(const Scene& scene, const Question& question) {
   return table;
 }
 
-/// Encodings in the order of their first record.
-std::vector<std::string> encodings_of(const Records& records) {
-  std::vector<std::string> names;
-  for (const Json* record : records)
-    if (const std::string name = text_at(*record, "/encoding"); std::find(names.begin(), names.end(), name) == names.end())
-      names.push_back(name);
+std::set<std::string> encodings_of(const Records& records) {
+  std::set<std::string> names;
+  for (const Json* record : records) names.insert(text_at(*record, "/encoding"));
   return names;
 }
 

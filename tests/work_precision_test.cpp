@@ -153,10 +153,10 @@ TEST_F(WorkPrecisionTest, ShowsTheFrontInTheOrderOfTime) {
 
 TEST_F(WorkPrecisionTest, ShowsWhatEachEncodingNeedsForEachError) {
   const Table table = made(four_settings()).tables[2];
-  EXPECT_THAT(cells(table, "encoding"), ElementsAre("uniform", "kd_tree"));
-  EXPECT_THAT(cells(table, "30 dB"), ElementsAre("8", "3"));
-  EXPECT_THAT(cells(table, "40 dB"), ElementsAre("8", "4"));
-  EXPECT_THAT(cells(table, "60 dB"), ElementsAre("30", "40"));
+  EXPECT_THAT(cells(table, "encoding"), ElementsAre("kd_tree", "uniform"));
+  EXPECT_THAT(cells(table, "30 dB"), ElementsAre("3", "8"));
+  EXPECT_THAT(cells(table, "40 dB"), ElementsAre("4", "8"));
+  EXPECT_THAT(cells(table, "60 dB"), ElementsAre("40", "30"));
   const Table beyond = made(four_settings(), R"([{"work_precision": {"reach": [70]}}])").tables[2];
   EXPECT_THAT(cells(beyond, "70 dB"), ElementsAre("–", "–"));
 }
