@@ -148,7 +148,7 @@ ErrorSplit split_error(const SplitRequest& r) {
   ErrorSplit split;
   split.sum_closes = chain.closes(r.picture, r.reference);
   split.causes = std::move(chain).causes();
-  if (r.truth != nullptr && !r.scene.settings.draws_surfaces()) {
+  if (r.truth != nullptr && !r.scene.settings.draws_surfaces() && r.scene.more_fields.empty()) {
     const HierarchyReference reference(r.hierarchy, r.build.field, r.field.definition);
     split.filter = compare(r.reference, reference.render(r.scene, r.reference_step, *r.truth));
   }

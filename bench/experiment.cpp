@@ -10,6 +10,7 @@
 #include <set>
 
 #include "bench/json_file.hpp"
+#include "structures/analytic_fields.hpp"
 #include "structures/error.hpp"
 
 namespace amrtex {
@@ -35,8 +36,9 @@ constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osm
 /// How many lists deep one value of this key is; what lies deeper is an axis.
 int value_depth(std::string_view key) {
   if (key == "extinction" || key == "color" || key == "surface_color" || key == "clip_planes") return 2;
-  constexpr std::array<std::string_view, 10> lists = {"point_light", "more_fields", "eye",  "at",    "up",
-                                                      "isovalues",   "iso_opacity", "root", "ratio", "skip_levels"};
+  constexpr std::array<std::string_view, 11> lists = {"point_light",       "more_fields", "eye",  "at",    "up",
+                                                      "isovalues",         "iso_opacity", "root", "ratio", "skip_levels",
+                                                      "transfer_functions"};
   return std::find(lists.begin(), lists.end(), key) != lists.end() ? 1 : 0;
 }
 
@@ -105,7 +107,7 @@ class Parser {
     Names keys = {"name",      "datasets", "encodings",     "filters",           "storage",
                   "filtering", "render",   "views",         "transfer_function", "frames",
                   "warm_up",   "seed",     "reference",     "context",           "memory_limit",
-                  "check",     "baseline", "explain_error", "explain_left_out"};
+                  "check",     "baseline", "explain_error", "explain_left_out",  "transfer_functions"};
     if (scene_) keys.push_back("region");
     root_.accept_keys(keys);
   }
@@ -310,7 +312,7 @@ class Parser {
     const std::vector<RenderPoint> functions = parse_transfer_functions();
     for (const RenderPoint& point : settings)
       if (point.settings.prune && functions.size() > 1)
-        root_.find("transfer_function")
+        (root_.find("transfer_function") ? root_.find("transfer_function") : root_.find("transfer_functions"))
             ->fail("with 'prune' the transfer function may not change: what one hides another may show; accepted: one");
     for (const RenderPoint& view : views)
       for (const RenderPoint& function : functions)
@@ -320,6 +322,11 @@ class Parser {
           if (uses_transfer_function(render.settings)) {
             render.transfer_function = function.transfer_function;
             render.transfer_function_name = function.transfer_function_name;
+          }
+          if (render.settings.draws_volume()) {  // other modes draw the first field alone
+            render.more_fields = function.more_fields;
+            if (const auto node = root_.find("transfer_functions"))
+              located(*node, [&] { validate_fields(scene_of(experiment_, render)); });
           }
           add_measured(render);
         }
@@ -546,7 +553,64 @@ class Parser {
     return points;
   }
 
+  /// Lists of transfer functions, each of a field: one list, or an axis of them.
+  std::vector<RenderPoint> parse_functions_of_fields(const JsonNode& key) {
+    if (const auto other = root_.find("transfer_function"))
+      other->fail("with 'transfer_functions' beside it; accepted: one of both");
+    std::vector<RenderPoint> points;
+    const std::vector<JsonNode> lists = values("transfer_functions", key);
+    for (std::size_t i = 0; i < lists.size(); ++i) {
+      RenderPoint point = parse_functions(lists[i]);
+      point.transfer_function_name = fmt::format("transfer functions {}", i + 1);
+      points.push_back(std::move(point));
+    }
+    return points;
+  }
+
+  /// [{"field": name, "extinction": ..., "color": ...}, ...]; the first belongs to the field of the data sets.
+  RenderPoint parse_functions(const JsonNode& list) {
+    RenderPoint point;
+    std::vector<std::string> names;
+    for (const JsonNode& node : list.items()) {
+      const JsonNode field = node.require("field");
+      if (std::find(names.begin(), names.end(), field.text()) != names.end())
+        field.fail(fmt::format("'{}' has a transfer function already; accepted: each field once", field.text()));
+      Json json = node.json();
+      json.erase("field");
+      const TransferFunction tf = parse_field_function(node, json);
+      if (names.empty()) {
+        point.transfer_function = tf;
+        draw_first(field);
+      } else {
+        point.more_fields.push_back({field.text(), tf});
+      }
+      names.push_back(field.text());
+    }
+    return point;
+  }
+
+  static TransferFunction parse_field_function(const JsonNode& node, const Json& json) {
+    try {
+      return parse_transfer_function(json);
+    } catch (const Error& e) {
+      culprit(node, e.what()).fail(e.what());
+    }
+  }
+
+  /// The field of the first transfer function is the data sets' own.
+  void draw_first(const JsonNode& field) {
+    for (DatasetSource& source : experiment_.datasets) {
+      const std::string name = source.file ? source.field.value_or(field.text()) : analytic_field_type(source.generate);
+      if (name != field.text())
+        field.fail(
+            fmt::format("the data set {} draws the field '{}', to which the first transfer function belongs; accepted: '{}'",
+                        source.name, name, name));
+      if (source.file) source.field = name;
+    }
+  }
+
   std::vector<RenderPoint> parse_transfer_functions() {
+    if (const auto several = root_.find("transfer_functions")) return parse_functions_of_fields(*several);
     if (!root_.find("transfer_function")) {
       require_no_transfer_function();
       return {RenderPoint{}};
@@ -685,7 +749,7 @@ Experiment read_scene(const std::filesystem::path& path) {
 }
 
 Scene scene_of(const Experiment& experiment, const RenderPoint& render) {
-  return Scene{render.view, render.transfer_function, render.settings, experiment.region};
+  return Scene{render.view, render.transfer_function, render.settings, experiment.region, render.more_fields};
 }
 
 Json surfaces_json(const Isosurfaces& iso) {
@@ -747,6 +811,7 @@ Json render_json(const RenderPoint& render) {
     json["transfer_function"] = to_json(render.transfer_function);
     json["transfer_function_name"] = render.transfer_function_name;
   }
+  if (!render.more_fields.empty()) json["more_transfer_functions"] = to_json(render.more_fields);
   return json;
 }
 

@@ -38,11 +38,12 @@ struct BuildPoint {
 struct RenderPoint {
   RenderSettings settings;
   View view;
-  std::string view_name;               ///< as given, or "view 2": its place in the list
-  TransferFunction transfer_function;  ///< without points where the mode has no use for it
-  std::string transfer_function_name;  ///< empty where the mode has no use for it
-  int frames = 9;                      ///< measured
-  int warm_up = 2;                     ///< drawn before them, not measured
+  std::string view_name;                   ///< as given, or "view 2": its place in the list
+  TransferFunction transfer_function;      ///< without points where the mode has no use for it
+  std::string transfer_function_name;      ///< empty where the mode has no use for it
+  std::vector<FieldTransfer> more_fields;  ///< `transfer_functions` behind the first: drawn in the same volume
+  int frames = 9;                          ///< measured
+  int warm_up = 2;                         ///< drawn before them, not measured
 };
 
 /// What pictures are judged by. `error` is always against a point's own filter.

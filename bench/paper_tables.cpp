@@ -189,7 +189,7 @@ std::vector<std::string> differing_settings(const Records& records) {
     for (const char* key : {"dataset", "encoding", "build_parameters", "filter", "storage", "filtering", "render"})
       settings[key] = record->at(key);
     if (settings["render"].is_object())
-      for (const char* key : {"view", "transfer_function"}) settings["render"].erase(key);  // they have names
+      for (const char* key : {"view", "transfer_function", "more_transfer_functions"}) settings["render"].erase(key);  // they have names
     const Json flat = settings.flatten();
     for (const auto& [pointer, value] : flat.items()) ++seen[pointer][value.dump()];
   }

@@ -137,7 +137,7 @@ class Runner {
     const Scene first = scene_of(experiment_, a);
     const Scene second = scene_of(experiment_, b);
     return scene_needs(first, build.filter, build.filtering) == scene_needs(second, build.filter, build.filtering) &&
-           first.settings.isosurfaces.color_field == second.settings.isosurfaces.color_field;
+           more_fields(*mesh_, first) == more_fields(*mesh_, second);
   }
 
   /// Render points of equal needs.
@@ -341,6 +341,7 @@ class Runner {
     settings.view_name = render.view_name;
     settings.transfer_function = render.transfer_function;
     settings.transfer_function_name = render.transfer_function_name;
+    settings.more_fields = render.more_fields;
     const std::string key = render_json(settings).dump();
     if (!baseline_) baseline_ = make_baseline(*first, scene_of(experiment_, settings));
     if (!baseline_consumer_ || key != baseline_key_) {
@@ -428,10 +429,13 @@ AmrHierarchy load_dataset(const Experiment& experiment, const DatasetSource& sou
   if (!source.file) return AmrHierarchy(generate_mesh(source.generate));
   std::vector<std::string> fields;  // empty: all of them
   if (source.field) {
-    fields.push_back(*source.field);
+    const auto need = [&](const std::string& name) {
+      if (!name.empty() && std::find(fields.begin(), fields.end(), name) == fields.end()) fields.push_back(name);
+    };
+    need(*source.field);
     for (const RenderPoint& render : experiment.renders) {
-      const std::string& color = render.settings.isosurfaces.color_field;
-      if (!color.empty() && std::find(fields.begin(), fields.end(), color) == fields.end()) fields.push_back(color);
+      need(render.settings.isosurfaces.color_field);
+      for (const FieldTransfer& other : render.more_fields) need(other.field);
     }
   }
   return AmrHierarchy(read_mesh(*source.file, fields));
@@ -442,6 +446,9 @@ std::unique_ptr<AnalyticField> analytic_field(const DatasetSource& source) {
 }
 
 std::vector<int> more_fields(const AmrHierarchy& hierarchy, const Scene& scene) {
+  std::vector<int> others;
+  for (const FieldTransfer& other : scene.more_fields) others.push_back(hierarchy.field_index(other.field));
+  if (!others.empty()) return others;
   const std::string& color = scene.settings.isosurfaces.color_field;
   if (!scene.settings.draws_surfaces() || color.empty()) return {};
   return {hierarchy.field_index(color)};
@@ -479,6 +486,10 @@ Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definit
   }
   if (scene.settings.draws_volume() || scene.settings.draws_surfaces())
     key["transfer_function"] = to_json(scene.transfer_function);
+  if (!scene.more_fields.empty()) {
+    key["more_transfer_functions"] = to_json(scene.more_fields);
+    for (const int field : more_fields(hierarchy, scene)) key["more_fields"].push_back(hierarchy.content_hash(field));
+  }
   if (scene.settings.point_light) {
     key["light"] = light_json(*scene.settings.point_light);
     key["light"].erase("shadow_step");  // sampling

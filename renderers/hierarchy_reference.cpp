@@ -13,6 +13,7 @@
 
 #include "renderers/reference_clip.hpp"
 #include "renderers/reference_field.hpp"
+#include "renderers/reference_fields.hpp"
 #include "renderers/reference_light.hpp"
 #include "renderers/reference_parts.hpp"
 #include "renderers/reference_point.hpp"
@@ -153,6 +154,29 @@ void draw_light(ReferenceTracer& tracer, const std::vector<RayPart>& parts, cons
   pixel[3] = 1 - light.transmittance();
 }
 
+/// A further field of a volume.
+struct OtherField {
+  const ReferenceField* field;
+  TransferTable table;
+};
+
+/// draw_light() of several fields.
+void draw_fields(ReferenceTracer& first, std::vector<ReferenceTracer>& others, const std::vector<RayPart>& parts,
+                 const Drawing& drawing, const std::vector<OtherField>& other_fields, double* pixel) {
+  std::vector<const TransferTable*> tables{drawing.table};
+  for (const OtherField& other : other_fields) tables.push_back(&other.table);
+  FieldsLight fields(std::move(tables));
+  for (std::size_t i = 0; i < 1 + others.size(); ++i)
+    trace(i == 0 ? first : others[i - 1], parts, drawing, [&](const PieceFunction& f, double from, double to) {
+      fields.add(i, f, from, to);
+      return true;
+    });
+  LightIntegral light;
+  fields.drain(light, drawing.part);
+  for (int c = 0; c < 3; ++c) pixel[c] = light.color()[c];
+  pixel[3] = 1 - light.transmittance();
+}
+
 double line_integral(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const Drawing& drawing) {
   const double part = drawing.part;
   double sum = 0;
@@ -177,6 +201,7 @@ struct Worker {
   ReferenceTracer tracer;
   std::optional<SurfacePainter> painter;  // where there are surfaces
   std::optional<LampTracer> lamp;         // where there is one
+  std::vector<ReferenceTracer> others;    // of further fields
 };
 
 /// Light of the lamp along a ray; empty where there is no lamp.
@@ -185,7 +210,7 @@ LightIntegral::Arriving arriving_light(Worker& worker, const IndexRay& ray) {
   return [&lamp = *worker.lamp, &ray](double t) { return lamp.light_at(ray.origin + t * ray.direction); };
 }
 
-void draw_pixel(Worker& worker, const Drawing& drawing, int x, int y, Picture& picture) {
+void draw_pixel(Worker& worker, const Drawing& drawing, const std::vector<OtherField>& others, int x, int y, Picture& picture) {
   const WorldRay world = camera_ray(drawing.camera, x, y, picture.width, picture.height);
   IndexRay ray{(world.origin - drawing.domain_lower) * drawing.cells_a_length, world.direction * drawing.cells_a_length};
   Vec3d lower = drawing.lower;
@@ -204,7 +229,10 @@ void draw_pixel(Worker& worker, const Drawing& drawing, int x, int y, Picture& p
   double* pixel = picture.pixel(x, y);
   switch (drawing.mode) {
     case Mode::dvr:
-      draw_light(worker.tracer, parts, drawing, arriving_light(worker, ray), pixel);
+      if (others.empty())
+        draw_light(worker.tracer, parts, drawing, arriving_light(worker, ray), pixel);
+      else
+        draw_fields(worker.tracer, worker.others, parts, drawing, others, pixel);
       break;
     case Mode::projection:
       *pixel = line_integral(worker.tracer, parts, drawing);
@@ -228,6 +256,7 @@ void check(const Scene& scene, double step) {
   validate_light(scene.settings);
   validate_clip_planes(scene.settings.clip_planes);
   validate_mirror(scene.settings);
+  validate_fields(scene);
 }
 
 double extinction_scale(const AmrHierarchy& h, const TransferFunction& tf) {
@@ -247,21 +276,26 @@ std::optional<FinestPosition> finest_position(const AmrHierarchy& hierarchy, con
 struct HierarchyReference::Data {
   ReferenceField field;
   std::mutex mutex;
-  std::map<int, ReferenceField> color_fields;  // made when a scene first asks for them
+  std::map<int, ReferenceField> others;  // made when a scene first asks for them
   tbb::enumerable_thread_specific<VertexCache> vertices;
 
   const ReferenceField* color_field(const Scene& scene);
+  const ReferenceField* other_field(const std::string& name);
 };
 
 /// The field that colours the scene's surfaces; null where the isovalue does.
 const ReferenceField* HierarchyReference::Data::color_field(const Scene& scene) {
   const std::string& name = scene.settings.isosurfaces.color_field;
   if (!scene.settings.draws_surfaces() || name.empty()) return nullptr;
+  return other_field(name);
+}
+
+const ReferenceField* HierarchyReference::Data::other_field(const std::string& name) {
   const int index = field.hierarchy().field_index(name);
   const std::lock_guard lock(mutex);
   // while it waits for its own tasks this thread must not take up another picture, which would lock again
   return tbb::this_task_arena::isolate(
-      [&] { return &color_fields.try_emplace(index, field.hierarchy(), index, field.definition()).first->second; });
+      [&] { return &others.try_emplace(index, field.hierarchy(), index, field.definition()).first->second; });
 }
 
 HierarchyReference::HierarchyReference(const AmrHierarchy& hierarchy, int field, FilterDefinition definition)
@@ -284,6 +318,7 @@ Picture HierarchyReference::render(const Scene& scene, double step, const Analyt
   if (scene.settings.draws_surfaces())
     throw UsageError(
         fmt::format("mode {}: an analytic field is drawn in the modes dvr, projection and mip", mode_name(scene.settings.mode)));
+  if (!scene.more_fields.empty()) throw UsageError("an analytic field is drawn alone, without further fields");
   return draw(scene, step, &truth);
 }
 
@@ -304,10 +339,14 @@ Picture HierarchyReference::draw(const Scene& scene, double step, const Analytic
   std::optional<LampScene> lamp;
   if (scene.settings.point_light)
     lamp.emplace(scene, data_->field, extinction_scale(h, scene.transfer_function), drawing.lower, drawing.upper, drawing.part);
+  std::vector<OtherField> others;
+  for (const FieldTransfer& f : scene.more_fields)
+    others.push_back({data_->other_field(f.field), TransferTable(f.transfer_function, extinction_scale(h, f.transfer_function))});
   Picture picture(scene.settings.width, scene.settings.height, scene.settings.picture_channels());
   const int columns = ceil_div(picture.width, kTile);
   tbb::enumerable_thread_specific<Worker> workers([&] {
-    Worker worker{ReferenceTracer(data_->field), std::nullopt, std::nullopt};
+    Worker worker{ReferenceTracer(data_->field), std::nullopt, std::nullopt, {}};
+    for (const OtherField& other : others) worker.others.emplace_back(*other.field);
     if (surfaces) worker.painter.emplace(*surfaces);
     if (lamp) worker.lamp.emplace(*lamp);
     return worker;
@@ -317,7 +356,7 @@ Picture HierarchyReference::draw(const Scene& scene, double step, const Analytic
     const int x0 = tile % columns * kTile;
     const int y0 = tile / columns * kTile;
     for (int y = y0; y < std::min(y0 + kTile, picture.height); ++y)
-      for (int x = x0; x < std::min(x0 + kTile, picture.width); ++x) draw_pixel(worker, drawing, x, y, picture);
+      for (int x = x0; x < std::min(x0 + kTile, picture.width); ++x) draw_pixel(worker, drawing, others, x, y, picture);
   });
   return picture;
 }

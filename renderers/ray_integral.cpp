@@ -174,23 +174,31 @@ void LightIntegral::add_interval(const PieceFunction& f, double from, double to,
   const double wanted = exact ? 1 : std::ceil((to - from) * length / max_part * (1 - 1e-9));
   const int parts = static_cast<int>(std::clamp(wanted, 1.0, kParts));
   const double width = (to - from) / parts;
+  const auto at = [&](double s) { return light(f, segment, s, length); };
   for (int i = 0; i < parts; ++i)
-    add_parts(f, segment, from + (i + 0.5) * width, width, length, exact ? std::numeric_limits<double>::infinity() : max_part);
+    add_parts(at, from + (i + 0.5) * width, width, length, exact ? std::numeric_limits<double>::infinity() : max_part);
   transmittance_ = passed_ * std::exp(-depth_);  // the product of the parts drifts
+}
+
+void LightIntegral::add_smooth(const Places& at, double length, double max_part, double from, double to) {
+  const int parts = static_cast<int>(std::clamp(std::ceil((to - from) * length / max_part * (1 - 1e-9)), 1.0, kParts));
+  const double width = (to - from) / parts;
+  for (int i = 0; i < parts; ++i) add_parts(at, from + (i + 0.5) * width, width, length, max_part);
+  transmittance_ = passed_ * std::exp(-depth_);
 }
 
 /// One part, or where it is longer than wanted its halves, as long as it is not thin: in a cell
 /// thousands of the finest wide, f is one cubic, and most of its parts would only cost time.
-void LightIntegral::add_parts(const PieceFunction& f, const TransferTable::Segment& segment, double middle, double width,
-                              double length, double max_part) {
+template <class At>
+void LightIntegral::add_parts(const At& at, double middle, double width, double length, double max_part) {
   if (transmittance_ < kOpaque) return;
   const double offset = width / (2 * kSqrt3);
-  const auto first = light(f, segment, middle - offset, length);
-  const auto second = light(f, segment, middle + offset, length);
+  const TransferTable::Light first = at(middle - offset);
+  const TransferTable::Light second = at(middle + offset);
   const double depth = (first.extinction + second.extinction) / 2 * (width * length);
   if (width * length > max_part * 1.001 && depth > kThin) {
-    add_parts(f, segment, middle - width / 4, width / 2, length, max_part);
-    add_parts(f, segment, middle + width / 4, width / 2, length, max_part);
+    add_parts(at, middle - width / 4, width / 2, length, max_part);
+    add_parts(at, middle + width / 4, width / 2, length, max_part);
     return;
   }
   add_part(first, second, depth);

@@ -94,6 +94,11 @@ class LightIntegral {
   /// `max_part` (both world), or of a 16th of the stretch where these are thin. `start`: where
   /// the piece begins, which only `arriving` asks for.
   void add(const PieceFunction& f, double length, double max_part, double from = 0, double to = 1, double start = 0);
+  /// What the volume emits and takes at a place of a stretch (its parameter, in [0, 1]).
+  using Places = std::function<TransferTable::Light(double)>;
+  /// Adds the part between two places of a stretch of `length` in which the light is smooth, in parts as above; of any field, or
+  /// of several.
+  void add_smooth(const Places& at, double length, double max_part, double from, double to);
   /// Adds a surface behind all that was added before.
   void add_surface(const Vec3d& rgb, double opacity);
 
@@ -102,8 +107,8 @@ class LightIntegral {
 
  private:
   void add_interval(const PieceFunction& f, double from, double to, double length, double max_part);
-  void add_parts(const PieceFunction& f, const TransferTable::Segment& segment, double middle, double width, double length,
-                 double max_part);
+  template <class At>
+  void add_parts(const At& at, double middle, double width, double length, double max_part);
   void add_part(const TransferTable::Light& first, const TransferTable::Light& second, double depth);
   TransferTable::Light light(const PieceFunction& f, const TransferTable::Segment& segment, double s, double length) const;
 

@@ -402,6 +402,31 @@ void validate_mirror(const RenderSettings& s) {
     throw UsageError("'mirror': 'level_of_detail' knows the sizes of cells and not of their images; accepted: one of both");
 }
 
+void validate_fields(const Scene& scene) {
+  if (scene.more_fields.empty()) return;
+  const RenderSettings& s = scene.settings;
+  const auto refuse = [&](std::string_view what) {
+    throw UsageError(fmt::format("'transfer_functions' of {} fields: {}", 1 + scene.more_fields.size(), what));
+  };
+  if (s.mode != Mode::dvr) refuse(fmt::format("the mode {} draws one; accepted: the mode dvr", mode_name(s.mode)));
+  if (s.integrator == Integrator::preintegrated || s.integrator == Integrator::tolerance)
+    refuse(
+        fmt::format("the integrator {} knows light between two values of one field; accepted: exponential_midpoint, euler, left",
+                    integrator_name(s.integrator)));
+  if (s.point_light) refuse("rays to the lamp of 'point_light' gather the depth of one; accepted: one of both");
+  if (s.prune) refuse("'prune' leaves out what is hidden in one and may be seen in another; accepted: one of both");
+  const auto check = [&](const TransferFunction& tf, std::string_view field) {
+    for (const auto& [curve, points] : {std::pair("extinction", tf.extinction.size()), std::pair("color", tf.color.size())})
+      if (points > kMostExactPoints)
+        refuse(fmt::format("'{}' of {} has {} points; at most {} are supported", curve, field, points, kMostExactPoints));
+  };
+  check(scene.transfer_function, "the first");
+  for (const FieldTransfer& f : scene.more_fields) {
+    validate(f.transfer_function);
+    check(f.transfer_function, f.field);
+  }
+}
+
 ClipPlane in_finest_cells(const AmrHierarchy& h, const ClipPlane& plane) {
   const auto largest = [](const Vec3d& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); };
   const double size = largest(plane.normal);
@@ -492,6 +517,15 @@ Json to_json(const TransferFunction& tf) {
   for (const auto& p : tf.color) json["color"].push_back(Json::array({p.value, p.rgb.r, p.rgb.g, p.rgb.b}));
   json["scale"] = tf.logarithmic ? "log" : "linear";
   json["length_unit"] = tf.length_unit == TransferFunction::LengthUnit::world ? "world" : "longest_edge";
+  return json;
+}
+
+Json to_json(const std::vector<FieldTransfer>& more_fields) {
+  Json json = Json::array();
+  for (const FieldTransfer& f : more_fields) {
+    json.push_back({{"field", f.field}});
+    json.back().update(to_json(f.transfer_function));
+  }
   return json;
 }
 

@@ -201,12 +201,27 @@ void validate_mirror(const RenderSettings& settings);
 /// Throws UsageError where the integrator does not go with the mode, the sampling or the tolerance.
 void validate_integrator(const RenderSettings& settings);
 
+/// A further field of the volume with its own transfer function.
+struct FieldTransfer {
+  std::string field;
+  TransferFunction transfer_function;
+};
+
 struct Scene {
   View view;
   TransferFunction transfer_function;
   RenderSettings settings;
   std::optional<std::array<Vec3d, 2>> region;  ///< sub-box to draw: lower and upper, world
+  /// Drawn with the field of `transfer_function` in one volume (mode dvr): extinctions add, and the emitted colour is their mean
+  /// weighted by extinction.
+  std::vector<FieldTransfer> more_fields = {};
 };
+
+/// Points of each curve of a transfer function that shaders evaluate as they are. More make a table, and are refused with several
+/// fields.
+inline constexpr std::size_t kMostExactPoints = 16;
+/// Throws UsageError where several fields do not go with the scene's other settings. Nothing where there is one.
+void validate_fields(const Scene& scene);
 
 /// Colours of surfaces: their own, or the transfer function's, or else one grey.
 TransferFunction surface_colors(const Scene& scene);
@@ -220,5 +235,7 @@ View parse_view(const Json& json);
 TransferFunction parse_transfer_function(const Json& json);
 Json to_json(const View& view);
 Json to_json(const TransferFunction& transfer_function);
+/// [{"field", "extinction", ...}, ...], as in experiment files.
+Json to_json(const std::vector<FieldTransfer>& more_fields);
 
 }  // namespace amrtex

@@ -11,7 +11,7 @@ namespace amrtex {
 namespace {
 
 /// Transfer functions of more points are drawn from a table.
-constexpr std::size_t kMostPoints = 16;
+constexpr std::size_t kMostPoints = kMostExactPoints;
 constexpr int kTableBins = 4096;
 constexpr std::size_t kMostInvisibleRanges = 8;
 
@@ -44,8 +44,8 @@ std::vector<double> color_points(const TransferFunction& tf) {
   return color;
 }
 
-/// `unit`: multiplies extinction so that it is per unit of ray length.
-void add_points(const TransferFunction& tf, double unit, UniformValues& uniforms) {
+/// `unit`: multiplies extinction so that it is per unit of ray length. `suffix`: of the uniforms' names.
+void add_points(const TransferFunction& tf, double unit, UniformValues& uniforms, const std::string& suffix = "") {
   std::vector<double> extinction;
   for (std::size_t i = 0; i < tf.extinction.size(); ++i) {
     const double x = tf.axis(tf.extinction[i].value);
@@ -55,8 +55,8 @@ void add_points(const TransferFunction& tf, double unit, UniformValues& uniforms
       slope = (std::min(tf.extinction[i + 1].extinction * unit, 1e30) - kappa) / (tf.axis(tf.extinction[i + 1].value) - x);
     extinction.insert(extinction.end(), {x, kappa, slope});
   }
-  uniforms.push_back({"u_extinction_points", extinction});
-  uniforms.push_back({"u_color_points", color_points(tf)});
+  uniforms.push_back({"u_extinction_points" + suffix, extinction});
+  uniforms.push_back({"u_color_points" + suffix, color_points(tf)});
 }
 
 void add_table(const TransferFunction& tf, double unit, SceneBindings& b) {
@@ -316,9 +316,9 @@ std::vector<double> value_scales(const EncodedField& field) {
 }
 
 /// Extinction per unit of ray length of an extinction of 1.
-double extinction_unit(const AmrHierarchy& h, const Scene& scene) {
+double extinction_unit(const AmrHierarchy& h, const TransferFunction& tf) {
   const Vec3d size = h.domain_upper() - h.domain_lower();
-  const bool world = scene.transfer_function.length_unit == TransferFunction::LengthUnit::world;
+  const bool world = tf.length_unit == TransferFunction::LengthUnit::world;
   return world ? smallest_edge(h) : smallest_edge(h) / std::max({size.x, size.y, size.z});
 }
 
@@ -344,6 +344,54 @@ void add_integrator(const Scene& scene, const EncodedField& field, double unit, 
         "are linear_lod, linear_page, linear_vertex, basis");
   b.uniforms.push_back({"u_interval_error", std::vector<double>{interval_error(s.tolerance)}});
   b.uniforms.push_back({"u_longest", std::vector<double>{kLongestInterval}});
+}
+
+/// The fields beside the first: nothing of theirs where there are none.
+void add_fields(const AmrHierarchy& h, const EncodedField& field, const Scene& scene, SceneBindings& b) {
+  validate_fields(scene);
+  const std::vector<FieldTransfer>& more = scene.more_fields;
+  const auto count = static_cast<int>(more.size());
+  b.defines.emplace_back("AMRTEX_TRANSFERS", 1 + count);
+  if (more.empty()) return;
+  if (count + 1 > kMostFields)
+    throw UsageError(fmt::format("encoding {}: {} fields with transfer functions; at most {} are supported", field.encoding,
+                                 count + 1, kMostFields));
+  if (field.field_count < count + 1)
+    throw Error(fmt::format("encoding {}: {} fields with transfer functions; the structure was built with {}", field.encoding,
+                            count + 1, field.field_count));
+  std::vector<double> invisible;
+  for (int number = 1; number <= count; ++number) {
+    const TransferFunction& tf = more[static_cast<std::size_t>(number - 1)].transfer_function;
+    const std::string suffix = fmt::format("_{}", number);
+    add_points(tf, extinction_unit(h, tf), b.uniforms, suffix);
+    b.defines.emplace_back("AMRTEX_EXTINCTION_POINTS" + suffix, static_cast<int>(tf.extinction.size()));
+    b.defines.emplace_back("AMRTEX_COLOR_POINTS" + suffix, static_cast<int>(tf.color.size()));
+    b.defines.emplace_back("AMRTEX_LOGARITHMIC" + suffix, tf.logarithmic ? 1 : 0);
+    const std::vector<double> ranges = invisible_ranges(tf);
+    for (std::size_t i = 0; i < ranges.size(); i += 2)
+      invisible.insert(invisible.end(), {static_cast<double>(number), ranges[i], ranges[i + 1]});
+  }
+  b.defines.emplace_back("AMRTEX_MORE_INVISIBLE_RANGES", static_cast<int>(invisible.size() / 3));
+  if (!invisible.empty()) b.uniforms.push_back({"u_more_invisible_ranges", invisible});
+}
+
+/// A structure without the parts that one transfer function hides has no other's picture.
+void require_hidden_parts(const EncodedField& field, const Scene& scene) {
+  if (field.invisible.empty()) return;
+  Scene pruned = scene;
+  pruned.settings.prune = true;
+  validate_prune(pruned.settings);
+  validate_fields(pruned);
+  const std::vector<double> hidden = invisible_ranges(scene.transfer_function);
+  for (const auto& [from, to] : field.invisible) {
+    bool still = false;
+    for (std::size_t i = 0; i < hidden.size(); i += 2) still = still || (from >= hidden[i] && to <= hidden[i + 1]);
+    if (!still)
+      throw UsageError(fmt::format(
+          "encoding {}: pruned for a transfer function that hides the values from {:.6g} to {:.6g}, of which this one "
+          "shows some; draw it with that or build without --prune",
+          field.encoding, from, to));
+  }
 }
 
 }  // namespace
@@ -378,6 +426,11 @@ UniformValues field_uniforms(const AmrHierarchy& h, const EncodedField& field) {
   uniforms.push_back({"u_level_width", widths});
   uniforms.push_back({"u_range_origin", std::vector<double>{field.range_origin}});
   uniforms.push_back({"u_value_scale", value_scales(field)});
+  if (!field.more_range_origins.empty()) {
+    std::vector<double> origins{field.range_origin};
+    origins.insert(origins.end(), field.more_range_origins.begin(), field.more_range_origins.end());
+    uniforms.push_back({"u_range_origins", origins});
+  }
   // without a scene nothing is pruned
   uniforms.push_back({"u_detail_level", std::vector<int>{h.finest_level()}});
   for (const char* name : {"u_detail_eye", "u_detail_scale"}) uniforms.push_back({name, numbers(Vec3d(0))});
@@ -394,6 +447,7 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
   b.uniforms = field_uniforms(h, field);
   add_camera(h, scene, b.uniforms);
   require_detail(field, s);
+  require_hidden_parts(field, scene);
   if (s.prunes_levels()) add_detail(h, scene, b.uniforms);
   b.uniforms.push_back({"u_step", std::vector<double>{s.step}});
   const bool by_tolerance = s.integrator == Integrator::tolerance;
@@ -406,7 +460,7 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
   int invisible_count = 0;
   if (s.draws_volume()) {
     const TransferFunction& tf = scene.transfer_function;
-    const double per_unit = extinction_unit(h, scene);
+    const double per_unit = extinction_unit(h, tf);
     b.transfer_exact = is_exact(tf);
     if (b.transfer_exact) {
       add_points(tf, per_unit, b.uniforms);
@@ -437,8 +491,9 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
   add_occlusion(h, s, b);
   b.defines.emplace_back("AMRTEX_MIRROR", s.mirror ? 2 * s.mirror->axis + (s.mirror->upper ? 2 : 1) : 0);
   add_light(h, s, b);
+  add_fields(h, field, scene, b);
   if (s.draws_surfaces()) add_surfaces(scene, field, b);
-  add_integrator(scene, field, extinction_unit(h, scene), b);
+  add_integrator(scene, field, extinction_unit(h, scene.transfer_function), b);
   return b;
 }
 
@@ -450,11 +505,13 @@ SceneNeeds scene_needs(const Scene& scene, Filter filter, Filtering filtering) {
   needs.draw_boxes = scene.settings.consumer != ConsumerKind::raycast;
   needs.everything = scene.settings.everything;
   needs.value_ranges = scene.settings.skip || needs.everything;
+  needs.field_ranges = needs.value_ranges && !scene.more_fields.empty();
   const Shading shading = scene.settings.draws_surfaces() ? scene.settings.isosurfaces.shading : Shading::none;
   const bool lit =
       shading == Shading::gradient || (scene.settings.draws_surfaces() && scene.settings.isosurfaces.ambient_occlusion);
   needs.analytic_gradients = shading == Shading::analytic;
   needs.gradients = lit || needs.everything;
+  validate_fields(scene);
   if (!scene.settings.prune) return needs;
   validate_prune(scene.settings);
   const std::vector<double> ranges = invisible_ranges(scene.transfer_function);

@@ -26,6 +26,9 @@
 #ifndef AMRTEX_VALUE_RANGES
 #error AMRTEX_VALUE_RANGES must be defined: 1 where regions know their value range, else 0
 #endif
+#ifndef AMRTEX_FIELD_RANGES
+#error AMRTEX_FIELD_RANGES must be defined: 1 where fields beside the first have value ranges as well, else 0
+#endif
 #ifndef AMRTEX_SCALED_STORAGE
 #error AMRTEX_SCALED_STORAGE must be defined: 1 where texels hold (value - a) / b, else 0
 #endif
@@ -41,6 +44,7 @@ DEFINE_INT(AMRTEX_LEVELS)
 DEFINE_INT(AMRTEX_FIELDS)
 DEFINE_INT(AMRTEX_VALIDITY)
 DEFINE_INT(AMRTEX_VALUE_RANGES)
+DEFINE_INT(AMRTEX_FIELD_RANGES)
 DEFINE_INT(AMRTEX_SCALED_STORAGE)
 DEFINE_INT(AMRTEX_LEVEL_OF_DETAIL)
 
@@ -109,6 +113,15 @@ real decode_value(IN(real) code, IN(int) field) {
 vec2r decode_range(IN(uint) code) {
   return vec2r(u_range_origin + as_real(code << 16u), u_range_origin + as_real(code & 0xffff0000u));
 }
+
+#if AMRTEX_CPP || AMRTEX_FIELD_RANGES
+UNIFORM_ARRAY(real, u_range_origins, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)  // what ranges of each field are relative to
+
+// The same of field number `field`. Encodings have `vec2r fetch_range(Region r, int field)` then, for fields beside the first.
+vec2r decode_field_range(IN(uint) code, IN(int) field) {
+  return vec2r(u_range_origins[field] + as_real(code << 16u), u_range_origins[field] + as_real(code & 0xffff0000u));
+}
+#endif
 
 // Trilinear interpolation; v[i] belongs to corner (i & 1, (i >> 1) & 1, i >> 2). Written
 // once and precise, so that every encoding's manual filter gives the same bits.

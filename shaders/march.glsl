@@ -22,6 +22,16 @@ DEFINE_INT(AMRTEX_RAY_DOUBLE)
 #if AMRTEX_CPP || AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE
 #include "tolerance.glsl"
 #endif
+#if !AMRTEX_CPP
+#ifndef AMRTEX_TRANSFERS
+#error AMRTEX_TRANSFERS must be defined: fields of the volume, each with a transfer function; 1 leaves out what several need
+#endif
+#endif
+DEFINE_INT(AMRTEX_TRANSFERS)
+#define AMRTEX_SEVERAL_FIELDS (AMRTEX_TRANSFERS > 1)
+#if AMRTEX_CPP || AMRTEX_SEVERAL_FIELDS
+#include "fields.glsl"
+#endif
 
 UNIFORM(real, u_step)       // cell widths: of the finest level (lattice) or of the region (adaptive)
 UNIFORM(real, u_early_end)  // transmittance at which a ray ends
@@ -38,6 +48,9 @@ bool region_invisible(IN(Accumulation) a, IN(Region) r) {
   if (AMRTEX_ISOVALUES != 0 && !on_one_side(a, r.value_range)) return false;
 #endif
   if (AMRTEX_OCCLUSION != 0 && a.probing) return true;
+#if AMRTEX_CPP || AMRTEX_SEVERAL_FIELDS
+  if (AMRTEX_SEVERAL_FIELDS) return !fields_visible(r);
+#endif
   if (AMRTEX_DRAWS_VOLUME) return !transfer_visible(r.value_range);
   if (AMRTEX_MODE == AMRTEX_MODE_ISO) return true;
   if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION) return r.value_range.x == real(0) && r.value_range.y == real(0);
@@ -45,8 +58,9 @@ bool region_invisible(IN(Accumulation) a, IN(Region) r) {
 }
 
 // locate(), but only as far as skipping needs: r may be a group of regions that cannot be seen, and needs open_region() before
-// it is sampled. Pre-integration samples what it skips: there every region is its own.
-#define AMRTEX_SKIPS_IN_STAGES (AMRTEX_STAGED_LOCATE && AMRTEX_SKIP != 0 && AMRTEX_VALUE_RANGES != 0 && !AMRTEX_PREINTEGRATED)
+// it is sampled. Pre-integration samples what it skips: there every region is its own. Groups know the range of the first field alone.
+#define AMRTEX_SKIPS_IN_STAGES \
+  (AMRTEX_STAGED_LOCATE && AMRTEX_SKIP != 0 && AMRTEX_VALUE_RANGES != 0 && !AMRTEX_PREINTEGRATED && !AMRTEX_SEVERAL_FIELDS)
 bool march_locate(IN(Accumulation) a, IN(Position) p, OUT(Region) r) {
   if (!AMRTEX_SKIPS_IN_STAGES) return locate(p, r);
   int group = locate_group(p, r);
@@ -55,6 +69,12 @@ bool march_locate(IN(Accumulation) a, IN(Position) p, OUT(Region) r) {
 
 // The sample at `at`, whose interval begins at `begin` (units of ray length; only isosurfaces use them).
 void take_sample(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q, IN(real) length, IN(ray_real) begin, IN(ray_real) at) {
+#if AMRTEX_CPP || AMRTEX_SEVERAL_FIELDS
+  if (AMRTEX_SEVERAL_FIELDS) {
+    take_fields(a, r, q, length);
+    return;
+  }
+#endif
   real value = fetch_field(r, q);
   if (AMRTEX_COUNT != 0) a.counted.x += 1;
   bool missing = AMRTEX_VALIDITY != 0 && is_no_value(value);
@@ -86,7 +106,9 @@ void take_sample(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q, IN(real) leng
 // each sample is its own: AMRTEX_CONSTANT_REGIONS is false.
 // `begin` and `way`: where the first interval begins, and from each to the next.
 #define AMRTEX_CONSTANT_REGIONS \
-  (AMRTEX_CELL_REGIONS && AMRTEX_FILTER == AMRTEX_FILTER_NEAREST && AMRTEX_SHADOWS == 0 && !AMRTEX_PREINTEGRATED)
+  (AMRTEX_CELL_REGIONS && AMRTEX_FILTER == AMRTEX_FILTER_NEAREST && AMRTEX_SHADOWS == 0 && !AMRTEX_PREINTEGRATED && !AMRTEX_SEVERAL_FIELDS)
+// Eight values for many samples are those of one field.
+#define AMRTEX_STENCILS (AMRTEX_CELL_REGIONS && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST && !AMRTEX_SEVERAL_FIELDS)
 void take_constant_samples(INOUT(Accumulation) a, IN(Region) r, IN(real) count, IN(real) length, IN(ray_real) begin, IN(ray_real) way) {
   real value = fetch_field(r, vec3r(0.5));
   if (AMRTEX_COUNT != 0) a.counted.x += int(count);
@@ -361,7 +383,7 @@ Position lattice_position(IN(LatticeBlock) block, IN(real) i) {
 
 // From sample `from` of the block; returns the one across a surface, or `count`.
 int march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) from, IN(int) count) {
-  bool stencils = AMRTEX_CELL_REGIONS && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST;  // their own cells decide where they end
+  bool stencils = AMRTEX_STENCILS;  // their own cells decide where they end
   vec3r inverse_step = safe_inverse(block.step);
   int i = from;
   if (i < count) {
@@ -550,7 +572,7 @@ real march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(
   }
 #endif
   if (AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_LEFT) q0 -= dq * real(0.5);
-  if (AMRTEX_CELL_REGIONS && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST) return march_adaptive_cell(a, r, q0, dq, count, interval, begin, from, phase);
+  if (AMRTEX_STENCILS) return march_adaptive_cell(a, r, q0, dq, count, interval, begin, from, phase);
   real i = from;
   real last = AMRTEX_RAY_OFFSET != 0 ? count + real(1) : count;
   if (i < last) {

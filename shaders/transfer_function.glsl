@@ -43,21 +43,23 @@ real transfer_axis(IN(real) value) { return curve_axis(value, AMRTEX_LOGARITHMIC
     return rgb;                                                                                       \
   }
 
+// The same for extinction per unit of ray length, of `count` points of 3 numbers: axis value, extinction, slope to the next point.
+// A segment's end is replaced by the next one's beginning, so that between two points of extinction 0 it is exactly 0.
+#define AMRTEX_EXTINCTION_CURVE(name, points, count)                                     \
+  real name(IN(real) x) {                                                                \
+    real kappa = points[1];                                                              \
+    for (int i = 0; i < count; ++i) {                                                    \
+      real way = x - points[3 * i];                                                      \
+      kappa = way > real(0) ? points[3 * i + 1] + points[3 * i + 2] * way : kappa;       \
+    }                                                                                    \
+    return kappa;                                                                        \
+  }
+
 #if AMRTEX_CPP || AMRTEX_EXTINCTION_POINTS > 0
-UNIFORM_ARRAY(real, u_extinction_points, 3 * AMRTEX_EXTINCTION_POINTS, 48)  // axis value, extinction, slope to the next point
+UNIFORM_ARRAY(real, u_extinction_points, 3 * AMRTEX_EXTINCTION_POINTS, 48)  // see AMRTEX_EXTINCTION_CURVE
 UNIFORM_ARRAY(real, u_color_points, 5 * AMRTEX_COLOR_POINTS, 80)            // see AMRTEX_COLOR_CURVE
 
-// Extinction per unit of ray length. A segment's end is replaced by the next one's beginning,
-// so that between two points of extinction 0 it is exactly 0.
-real points_extinction(IN(real) x) {
-  real kappa = u_extinction_points[1];
-  for (int i = 0; i < AMRTEX_EXTINCTION_POINTS; ++i) {
-    real way = x - u_extinction_points[3 * i];
-    kappa = way > real(0) ? u_extinction_points[3 * i + 1] + u_extinction_points[3 * i + 2] * way : kappa;
-  }
-  return kappa;
-}
-
+AMRTEX_EXTINCTION_CURVE(points_extinction, u_extinction_points, AMRTEX_EXTINCTION_POINTS)
 AMRTEX_COLOR_CURVE(points_color, u_color_points, AMRTEX_COLOR_POINTS)
 #endif
 

@@ -51,6 +51,36 @@ std::uint32_t encode_range(ValueRange range, double origin, Storage storage, Sto
   return below | (std::min(above, 0x7f80U) << 16);
 }
 
+std::uint32_t encode_range(const EncodedField& field, int number, ValueRange range) {
+  if (range.empty()) return kVacantRange;
+  const double origin = number == 0 ? field.range_origin : field.more_range_origins[static_cast<std::size_t>(number - 1)];
+  return encode_range(range, origin, field.storage, field.scale_of(number));
+}
+
+std::int64_t MoreRanges::bytes(const BuildRequest& request, std::int64_t regions) {
+  return request.needs.field_ranges ? 4 * std::max<std::int64_t>(regions, 1) * (request.field_count() - 1) : 0;
+}
+
+MoreRanges::MoreRanges(const Encoding& encoding, const BuildRequest& request, const std::string& name, std::int64_t regions)
+    : fields_(request.field_count()) {
+  const std::int64_t size = bytes(request, regions);
+  if (size == 0) return;
+  if (size > request.context.max_buffer_bytes)
+    throw UnsupportedError(
+        fmt::format("encoding {}: value ranges of further fields take {} bytes, a buffer of this context at most {}",
+                    encoding.name(), size, request.context.max_buffer_bytes));
+  buffer_ = make_buffer(name, TexelFormat::r32ui, size / 4);
+}
+
+void MoreRanges::set(const EncodedField& field, std::int64_t region, int number, ValueRange range) {
+  if (number == 0 || !needed()) return;
+  buffer_.as<std::uint32_t>()[region * (fields_ - 1) + number - 1] = encode_range(field, number, range);
+}
+
+void MoreRanges::move_to(EncodedField& field) {
+  if (needed()) field.textures.push_back(std::move(buffer_));
+}
+
 bool hidden(const SceneNeeds& needs, ValueRange range, double origin, Storage storage, StorageScale scale) {
   if (needs.invisible.empty()) return false;
   if (range.empty()) return true;
@@ -161,9 +191,12 @@ EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy
   for (const int other : request.more_fields) {
     const FieldStatistics& o = hierarchy.statistics(other);
     field.more_scales.push_back(storage_scale(request.storage, o.min, o.max));
+    if (request.needs.field_ranges)
+      field.more_range_origins.push_back(range_origin(o, request.storage, field.more_scales.back()));
   }
   const bool scaled = request.storage != Storage::r32f && request.storage != Storage::r64f;
   field.range_origin = range_origin(s, request.storage, field.scale);
+  field.invisible = request.needs.invisible;
   field.shader.file = fmt::format("{0}/{0}.glsl", encoding.name());
   field.shader.defines = {{"AMRTEX_FILTER", static_cast<int>(request.needs.filter)},
                           {"AMRTEX_HARDWARE_FILTERING", field.filtering == Filtering::hardware ? 1 : 0},
@@ -173,6 +206,7 @@ EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy
                           {"AMRTEX_FIELDS", field.field_count},
                           {"AMRTEX_VALIDITY", any_missing(hierarchy, request) ? 1 : 0},
                           {"AMRTEX_VALUE_RANGES", request.needs.value_ranges ? 1 : 0},
+                          {"AMRTEX_FIELD_RANGES", request.needs.field_ranges && request.field_count() > 1 ? 1 : 0},
                           {"AMRTEX_SCALED_STORAGE", scaled ? 1 : 0},
                           {"AMRTEX_LEVEL_OF_DETAIL", request.needs.level_of_detail ? 1 : 0}};
   return field;

@@ -34,6 +34,27 @@ double range_origin(const FieldStatistics& statistics, Storage storage, StorageS
 /// skipping works for fields of any magnitude. decode_range() in contract.glsl reads it.
 std::uint32_t encode_range(ValueRange range, double origin, Storage storage, StorageScale scale);
 
+/// The same of field number `number` of a structure; kVacantRange where the range is empty.
+std::uint32_t encode_range(const EncodedField& field, int number, ValueRange range);
+
+/// Coded ranges of the fields beside the first, as fetch_range() reads them: those of a region side by side. Without data, and
+/// without bytes, where the scene needs none (SceneNeeds::field_ranges).
+class MoreRanges {
+ public:
+  static std::int64_t bytes(const BuildRequest& request, std::int64_t regions);
+  /// `name`: of the buffer in the encoding's GLSL. Throws UnsupportedError where it passes the context's limit.
+  MoreRanges(const Encoding& encoding, const BuildRequest& request, const std::string& name, std::int64_t regions);
+  bool needed() const { return !buffer_.data.empty(); }
+  /// For threads that have regions of their own. Nothing where no ranges are needed, or where `number` is 0.
+  void set(const EncodedField& field, std::int64_t region, int number, ValueRange range);
+  /// Moves the buffer to the field's, where there is one.
+  void move_to(EncodedField& field);
+
+ private:
+  int fields_;
+  HostTexture buffer_;
+};
+
 /// Stores `count` values side by side from texel `first`; NaN is stored as 0.
 void store_values(Storage storage, StorageScale scale, const double* values, std::size_t count, std::byte* data,
                   std::size_t first);

@@ -74,14 +74,15 @@ enum class Part {
 struct SceneNeeds {
   Filter filter = Filter::nearest;
   Filtering filtering = Filtering::manual;
-  bool value_ranges = true;      ///< regions are skipped by their value range
-  bool gradients = false;        ///< surfaces are lit: stored gradients are of use where an encoding has room for them
+  bool value_ranges = true;         ///< regions are skipped by their value range
+  bool gradients = false;           ///< surfaces are lit: stored gradients are of use where an encoding has room for them
   bool analytic_gradients = false;  ///< surfaces are lit by the derivative of f, which the encoding itself computes
-  bool level_of_detail = false;  ///< refined cells may be drawn in place of what lies below them
-  bool draw_boxes = false;       ///< the consumer draws box by box: EncodedField::draw_tree, where the encoding can give one
-  bool everything = false;       ///< nothing is left out for want of need: what leaving out saves is measured against this
-  bool validity = false;         ///< bits are kept though every cell has a value
-  bool border = false;           ///< a border is kept though the filter reads none
+  bool level_of_detail = false;     ///< refined cells may be drawn in place of what lies below them
+  bool draw_boxes = false;          ///< the consumer draws box by box: EncodedField::draw_tree, where the encoding can give one
+  bool everything = false;          ///< nothing is left out for want of need: what leaving out saves is measured against this
+  bool validity = false;            ///< bits are kept though every cell has a value
+  bool border = false;              ///< a border is kept though the filter reads none
+  bool field_ranges = false;        ///< several fields are drawn: those beside the first have value ranges as well
   /// First and last value of intervals without extinction, ascending (renderers/scene_bindings.hpp): parts of the structure whose
   /// values lie in one of them are left out. Empty: all are kept.
   std::vector<std::array<double, 2>> invisible = {};
@@ -125,7 +126,7 @@ struct ShaderPart {
 };
 
 /// Built data: plain, independent of GL and of any consumer. One field of the mesh, or several
-/// over one structure; ranges, constants and skipping are those of the first, the drawn one.
+/// over one structure; constants are those of the first, the drawn one, and so are ranges unless the scene needs all fields'.
 struct EncodedField {
   std::string encoding;
   Json build_parameters;        ///< complete, with defaults filled in
@@ -133,9 +134,13 @@ struct EncodedField {
   Filtering filtering = Filtering::manual;
   Storage storage = Storage::r32f;
   int field_count = 1;
-  StorageScale scale;                     ///< of the first field
-  std::vector<StorageScale> more_scales;  ///< of the others
-  double range_origin = 0;                ///< what coded value ranges are relative to (build_tools.hpp)
+  StorageScale scale;                      ///< of the first field
+  std::vector<StorageScale> more_scales;   ///< of the others
+  double range_origin = 0;                 ///< what coded value ranges are relative to (build_tools.hpp)
+  std::vector<double> more_range_origins;  ///< of the other fields, where they have ranges (SceneNeeds::field_ranges)
+  /// What was asked to be left out where nothing is to be seen (SceneNeeds::invisible): such a field shows no scene that sees any
+  /// of it.
+  std::vector<std::array<double, 2>> invisible;
   ShaderPart shader;
   std::vector<HostTexture> textures;
   std::vector<std::pair<std::string, Vec3i>> integer_uniforms;  ///< ivec3 uniforms of the encoding's GLSL

@@ -10,6 +10,7 @@
 
 #include "bench/json_file.hpp"
 #include "bench/record.hpp"
+#include "bench/runner.hpp"
 #include "structures/error.hpp"
 
 namespace amrtex {
@@ -589,6 +590,88 @@ TEST(ExplainLeftOut, IsOffUnlessAskedForAndNamesTheRecordOnlyThen) {
   EXPECT_EQ(hash(parsed(kSmall)), hash(parsed(with("explain_left_out", "false"))));
   EXPECT_NE(hash(parsed(kSmall)), hash(explained));
   EXPECT_THAT(complaint(with("explain_left_out", "1")), HasSubstr("explain_left_out"));
+}
+
+// --- transfer functions of several fields
+
+constexpr const char* kLight = R"("extinction": [[0, 0], [1, 5]], "color": [[0, 1, 1, 1]])";
+
+/// kSmall with transfer functions of the named fields, of a mesh that has two.
+std::string with_functions(const std::vector<std::string>& fields, const std::string& render = "{}") {
+  Json json = Json::parse(without("transfer_function"));
+  json["datasets"][0]["generate"]["more_fields"] = {"linear"};
+  json["render"] = Json::parse(render);
+  for (const std::string& field : fields)
+    json["transfer_functions"].push_back(Json::parse(fmt::format(R"({{"field": "{}", {}}})", field, kLight)));
+  return json.dump(1);
+}
+
+TEST(TransferFunctions, OfSeveralFieldsAreDrawnInOneVolume) {
+  const Experiment e =
+      parsed(with_functions({"blobs_shell", "linear"}, R"({"mode": ["dvr", "projection", "iso"], "isovalues": [1]})"));
+  ASSERT_EQ(e.renders.size(), 3u);
+  const RenderPoint& volume = e.renders[0];
+  EXPECT_EQ(volume.transfer_function.extinction.size(), 2u);
+  ASSERT_EQ(volume.more_fields.size(), 1u);
+  EXPECT_EQ(volume.more_fields[0].field, "linear");
+  EXPECT_EQ(scene_of(e, volume).more_fields.size(), 1u);
+  EXPECT_EQ(volume.transfer_function_name, "transfer functions 1");
+  EXPECT_EQ(render_json(volume)["more_transfer_functions"][0]["field"], "linear");
+  for (const std::size_t other : {1u, 2u})
+    EXPECT_TRUE(e.renders[other].more_fields.empty()) << "other modes draw the first alone";
+  const auto hash = [](const Experiment& x) {
+    return configuration_hash(point_configuration(x, x.builds.front(), x.renders.front(), "mesh"));
+  };
+  EXPECT_EQ(hash(parsed(with_functions({"blobs_shell"}))), hash(parsed(with("render", "{}")))) << "one is as transfer_function";
+  EXPECT_NE(hash(parsed(with_functions({"blobs_shell"}))), hash(parsed(with_functions({"blobs_shell", "linear"}))));
+}
+
+TEST(TransferFunctions, OfSeveralFieldsAreAnAxisAsAListOfLists) {
+  Json json = Json::parse(with_functions({"blobs_shell", "linear"}));
+  Json alone = json["transfer_functions"];
+  alone.erase(1);
+  json["transfer_functions"] = {json["transfer_functions"], alone};
+  const Experiment e = parsed(json.dump());
+  ASSERT_EQ(e.renders.size(), 2u);
+  EXPECT_EQ(e.renders[0].more_fields.size(), 1u);
+  EXPECT_TRUE(e.renders[1].more_fields.empty());
+  EXPECT_THAT(e.axes, ElementsAre("transfer_functions"));
+}
+
+TEST(TransferFunctions, OfSeveralFieldsAreRefusedByPlaceAndName) {
+  const std::vector<std::string> both{"blobs_shell", "linear"};
+  EXPECT_THAT(complaint(with_functions({"linear", "blobs_shell"})),
+              AllOf(HasSubstr("transfer_functions[0].field:"), HasSubstr("'blobs_shell'")));
+  EXPECT_THAT(complaint(with_functions({"blobs_shell", "linear", "linear"})),
+              AllOf(HasSubstr("transfer_functions[2].field:"), HasSubstr("each field once")));
+  Json json = Json::parse(with_functions(both));
+  json["transfer_functions"][1].erase("field");
+  EXPECT_THAT(complaint(json.dump()), HasSubstr("field"));
+  json = Json::parse(with_functions(both));
+  json["transfer_functions"][1]["opacity"] = 1;
+  EXPECT_THAT(complaint(json.dump()), AllOf(HasSubstr("transfer_functions[1]"), HasSubstr("opacity")));
+  json["transfer_functions"][1] = json["transfer_functions"][0];
+  json["transfer_function"] = Json::parse(kSmall)["transfer_function"];
+  EXPECT_THAT(complaint(json.dump()), AllOf(HasSubstr("transfer_function:"), HasSubstr("one of both")));
+  for (const auto& [render, word] :
+       std::vector<std::pair<std::string, std::string>>{{R"({"mode": "dvr_iso", "isovalues": [1]})", "the mode dvr_iso"},
+                                                        {R"({"integrator": "preintegrated"})", "the integrator preintegrated"},
+                                                        {R"({"tolerance": 0.01})", "the integrator tolerance"},
+                                                        {R"({"point_light": [1, 2, 3]})", "'point_light'"},
+                                                        {R"({"prune": true})", "'prune'"}})
+    EXPECT_THAT(complaint(with_functions(both, render)),
+                AllOf(HasSubstr("transfer_functions:"), HasSubstr("2 fields"), HasSubstr(word)));
+}
+
+TEST(TransferFunctions, OfAnUnknownFieldNameThoseThereAre) {
+  const Experiment e = parsed(with_functions({"blobs_shell", "rho"}));
+  const AmrHierarchy mesh = load_dataset(e, e.datasets.front());
+  try {
+    more_fields(mesh, scene_of(e, e.renders.front()));
+    ADD_FAILURE();
+  } catch (const UsageError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("'rho'"), HasSubstr("blobs_shell, linear")));
+  }
 }
 
 }  // namespace

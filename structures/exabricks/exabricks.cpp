@@ -146,6 +146,12 @@ struct RegionFacts {
   bool missing = false;  ///< has a cell no value, in any field?
 };
 
+/// Has a texel of the pool a value in a field?
+bool has_value(const Plan& p, const Stores& stores, int number, std::size_t texel) {
+  const auto* words = stores.validity.as<std::uint32_t>() + number * p.validity_words;
+  return ((words[texel / 32] >> (texel % 32)) & 1U) != 0;
+}
+
 RegionFacts region_facts(const Plan& p, int border, const Region& r, const Stores& stores, StorageScale scale) {
   RegionFacts facts;
   const HostTexture& pool = stores.pools.front();
@@ -158,8 +164,7 @@ RegionFacts region_facts(const Plan& p, int border, const Region& r, const Store
       const std::size_t texel = all.offset(c + shift);
       bool has = true;
       for (std::size_t number = 0; p.missing && number < stores.pools.size(); ++number) {
-        const auto* words = stores.validity.as<std::uint32_t>() + static_cast<std::int64_t>(number) * p.validity_words;
-        const bool bit = ((words[texel / 32] >> (texel % 32)) & 1U) != 0;
+        const bool bit = has_value(p, stores, static_cast<int>(number), texel);
         if (number == 0) has = bit;
         facts.missing = facts.missing || !bit;
       }
@@ -167,6 +172,23 @@ RegionFacts region_facts(const Plan& p, int border, const Region& r, const Store
     });
   }
   return facts;
+}
+
+/// Of the cells of a region's pieces in a field, as stored.
+ValueRange range_in_field(const Plan& p, int border, const Region& r, const Stores& stores, StorageScale scale, int number) {
+  ValueRange range;
+  const HostTexture& pool = stores.pools[static_cast<std::size_t>(number)];
+  const Box all{Vec3i(0), pool.size};
+  for (int k = 0; k < r.pieces; ++k) {
+    const Piece& piece = p.set.pieces[static_cast<std::size_t>(r.first_piece + k)];
+    const auto brick = static_cast<std::size_t>(piece.brick);
+    const Vec3i shift = p.packing.at[brick] + Vec3i(border) - p.tree.bricks[brick].cells.lower;
+    for_each_cell(piece.cells, [&](const Vec3i& c) {
+      const std::size_t texel = all.offset(c + shift);
+      if (!p.missing || has_value(p, stores, number, texel)) range.add(load_value(pool.format, scale, pool.data.data(), texel));
+    });
+  }
+  return range;
 }
 
 class Exabricks final : public Encoding {
@@ -292,7 +314,7 @@ void Exabricks::plan_traversal(const AmrHierarchy& h, const BuildRequest& reques
 /// Exact bytes against the limits of the context and of the user, before anything is allocated.
 void Exabricks::require_sizes(const BuildRequest& request, const Options& o, const Plan& p) const {
   const auto nodes = static_cast<std::int64_t>(p.set.nodes.size());
-  const std::array<std::pair<const char*, std::int64_t>, 10> buffers{
+  const std::array<std::pair<const char*, std::int64_t>, 11> buffers{
       {{"regions", 32 * std::max<std::int64_t>(p.regions(), 1)},
        {"value ranges", request.needs.value_ranges ? 4 * std::max<std::int64_t>(p.regions(), 1) : 0},
        {"bricks", o.cells ? 32 * std::max<std::int64_t>(p.bricks(), 1) : 0},
@@ -302,7 +324,8 @@ void Exabricks::require_sizes(const BuildRequest& request, const Options& o, con
        {"the start grid", 4 * static_cast<std::int64_t>(p.grid.entries.size())},
        {"the start grid's nodes", 32 * static_cast<std::int64_t>(p.grid.nodes.size())},
        {"nodes over the bricks", o.cells ? 32 * static_cast<std::int64_t>(p.tree.nodes.size()) : 0},
-       {"validity bits", 4 * request.field_count() * p.validity_words}}};
+       {"validity bits", 4 * request.field_count() * p.validity_words},
+       {"value ranges of further fields", MoreRanges::bytes(request, p.regions())}}};
   const std::string remedy = o.brick_width < kWidestBrick
                                  ? fmt::format("; a brick_width above {} makes fewer, up to {}", o.brick_width, kWidestBrick)
                                  : std::string();
@@ -401,6 +424,7 @@ std::uint32_t packed_size(const Vec3i& size) {
 /// The regions as the shader reads them, and what is known of their cells.
 struct RegionTables {
   HostTexture regions, ranges;
+  MoreRanges more_ranges;
   std::vector<RegionFacts> facts;
   double leak = 0;
 };
@@ -414,9 +438,9 @@ std::uint32_t coded_range(const BuildRequest& request, const EncodedField& field
   return encode_range({facts.range.min - leak, facts.range.max + leak}, field.range_origin, request.storage, field.scale);
 }
 
-RegionTables make_regions(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& p,
-                          const EncodedField& field, const Stores& stores) {
-  RegionTables out;
+RegionTables make_regions(const Encoding& encoding, const AmrHierarchy& h, const BuildRequest& request, const Options& o,
+                          const Plan& p, const EncodedField& field, const Stores& stores) {
+  RegionTables out{{}, {}, MoreRanges(encoding, request, "exa_more_ranges", p.regions()), {}};
   out.regions = make_buffer("exa_regions", TexelFormat::rgba32ui, 2 * p.regions());
   if (request.needs.value_ranges) out.ranges = make_buffer("exa_ranges", TexelFormat::r32ui, p.regions());
   out.facts.resize(p.set.regions.size());
@@ -440,6 +464,12 @@ RegionTables make_regions(const AmrHierarchy& h, const BuildRequest& request, co
     for (int a = 0; a < 3; ++a) words[4 + a] = static_cast<std::uint32_t>(b.box().lower[a]);
     words[7] = static_cast<std::uint32_t>(r.brick);
     if (request.needs.value_ranges) out.ranges.as<std::uint32_t>()[i] = coded_range(request, field, facts, out.leak);
+    for (int number = 1; out.more_ranges.needed() && number < field.field_count; ++number) {
+      ValueRange range = range_in_field(p, o.border, r, stores, field.scale_of(number), number);
+      const double leak = pool.hardware_linear ? leaked_value(h.statistics(request.field_at(number)), pool.size) : 0;
+      if (!range.empty()) range = {range.min - leak, range.max + leak};
+      out.more_ranges.set(field, static_cast<std::int64_t>(i), number, range);
+    }
   });
   return out;
 }
@@ -680,7 +710,7 @@ EncodedField Exabricks::build(const AmrHierarchy& h, const BuildRequest& request
   field.statistics = statistics(o, p);
   add_defines(o, p, field);
   field.left_out = left_out(request, o, p);
-  RegionTables tables = make_regions(h, request, o, p, field, stores);
+  RegionTables tables = make_regions(*this, h, request, o, p, field, stores);
   if (o.hats && !o.cells) field.textures.push_back(make_pieces(h, o, p));
   if (o.traversal == Traversal::bvh)
     field.textures.push_back(make_bvh(p));
@@ -689,6 +719,7 @@ EncodedField Exabricks::build(const AmrHierarchy& h, const BuildRequest& request
   if (o.traversal == Traversal::grid) add_start_grid(h, request, p, tables, field);
   field.textures.push_back(std::move(tables.regions));
   if (request.needs.value_ranges) field.textures.push_back(std::move(tables.ranges));
+  tables.more_ranges.move_to(field);
   if (o.cells) {
     field.textures.push_back(make_bricks(o, p));
     field.textures.push_back(BrickNodeWriter(p.tree).texture());

@@ -176,6 +176,9 @@ bool locate_in_group(IN(Position) p, IN(int) group, INOUT(Region) r) {
   uint region = exa_descend(group, p.cell, r);
 #endif
   r.handle = ivec4(int(region), 0, 0, 0);
+#if AMRTEX_CPP || AMRTEX_FIELD_RANGES
+  r.brick.x = region;
+#endif
   r.level = AMRTEX_LEVELS - 1;
   r.width = 1;
   if (region == AMRTEX_EXA_NO_REGION) return false;
@@ -195,6 +198,9 @@ void open_region(INOUT(Region) r) {
   r.level = int(store.w >> uint(AMRTEX_EXA_PIECE_BITS + AMRTEX_EXA_LEVEL_BITS + 1)) & levels;
   r.width = level_width(r.level);
   r.brick = uvec4(0u, 0u, 0u, uint(int(store.w >> uint(AMRTEX_EXA_PIECE_BITS)) & levels));
+#if AMRTEX_CPP || AMRTEX_FIELD_RANGES
+  r.brick.x = uint(region);
+#endif
   uint flags = AMRTEX_EXA_OWN_FLAG | AMRTEX_EXA_MISSING_FLAG | ((1u << uint(AMRTEX_EXA_PIECE_BITS)) - 1u);
   r.handle = ivec4(int(store.x), int(store.y), AMRTEX_EXA_CELLS != 0 ? int(place.w) : int(store.z),
                    (store.w & AMRTEX_EXA_PLAIN_FLAG) != 0u ? 0 : int(store.w & flags));
@@ -206,6 +212,14 @@ void open_region(INOUT(Region) r) {
   r.texture_scale *= exa_inverse_pool();
 #endif
 }
+
+#if AMRTEX_CPP || AMRTEX_FIELD_RANGES
+BUFFER(uint, exa_more_ranges, exa_more_ranges_block)  // coded ranges of the further fields, those of a region side by side
+
+vec2r fetch_range(IN(Region) r, IN(int) field) {
+  return decode_field_range(exa_more_ranges[int(r.brick.x) * (AMRTEX_FIELDS - 1) + field - 1], field);
+}
+#endif
 
 bool locate(IN(Position) p, OUT(Region) r) {
   r.value_range = vec2r(0);

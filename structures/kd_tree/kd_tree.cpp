@@ -148,6 +148,7 @@ struct Stores {
   std::vector<HostTexture> values;  ///< one pool a field, all laid out in the same way; or one texture a brick and field
   HostTexture data;
   HostTexture validity;  ///< without data where every cell has a value
+  MoreRanges more_ranges;
 };
 
 /// Writes the values, validity bits and ranges of bricks. One object a thread; a brick is one thread's.
@@ -156,8 +157,9 @@ class BrickWriter {
   BrickWriter(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& plan, const EncodedField& field,
               Stores& out)
       : hierarchy_(h), request_(request), options_(o), plan_(plan), field_(field), out_(out) {
-    if (field.filtering == Filtering::hardware && o.vertices)
-      leak_ = leaked_value(h.statistics(request.field), plan.packing.size);
+    const bool leaks = field.filtering == Filtering::hardware && o.vertices;
+    for (int number = 0; number < field.field_count; ++number)
+      leak_.push_back(leaks ? leaked_value(h.statistics(request.field_at(number)), plan.packing.size) : 0);
   }
 
   void write(int brick) {
@@ -177,7 +179,9 @@ class BrickWriter {
       store(brick, number);
       note(leaf, chunk, number);
     });
-    if (number == 0 && request_.needs.value_ranges) data_node(leaf)[options_.bindless ? 2 : 1] = coded_range();
+    if (number == 0 && request_.needs.value_ranges)
+      data_node(leaf)[options_.bindless ? 2 : 1] = encode_range(field_, 0, whole_range(0));
+    out_.more_ranges.set(field_, leaf, number, whole_range(number));
   }
 
   std::uint32_t* data_node(int leaf) const {
@@ -230,9 +234,10 @@ class BrickWriter {
     });
   }
 
-  std::uint32_t coded_range() const {
-    if (!any_) return kVacantRange;
-    return encode_range({range_.min - leak_, range_.max + leak_}, field_.range_origin, request_.storage, field_.scale);
+  /// Of all that a field can return in the leaf; empty where it has no value.
+  ValueRange whole_range(int number) const {
+    const double leak = leak_[static_cast<std::size_t>(number)];
+    return any_ ? ValueRange{range_.min - leak, range_.max + leak} : ValueRange{};
   }
 
   const AmrHierarchy& hierarchy_;
@@ -241,7 +246,7 @@ class BrickWriter {
   const Plan& plan_;
   const EncodedField& field_;
   Stores& out_;
-  double leak_ = 0;
+  std::vector<double> leak_;  ///< of each field
   Box box_;
   std::vector<double> values_, own_;
   std::vector<std::uint8_t> missing_;
@@ -332,13 +337,14 @@ void KdTree::plan_pool(const BuildRequest& request, const Options& o, Plan& p) c
 void KdTree::require_sizes(const BuildRequest& request, const Options& o, const Plan& p) const {
   const auto starts = static_cast<std::int64_t>(p.grid.nodes.size());
   const std::int64_t bricks = o.bindless ? std::max<std::int64_t>(p.brick_count(), 1) : 0;
-  const std::array<std::pair<const char*, std::int64_t>, 8> buffers{
+  const std::array<std::pair<const char*, std::int64_t>, 9> buffers{
       {{"nodes", 8 * p.node_count()},
        {"handles", 8 * bricks * request.field_count()},
        {"brick sizes", needs_brick_sizes(request, o) ? 4 * bricks : 0},
        {"data nodes", 4 * std::max<std::int64_t>(p.data_words * p.block_count(), 1)},
        {"levels of data nodes", request.needs.level_of_detail ? 4 * std::max<std::int64_t>(p.block_count(), 1) : 0},
        {"validity bits", 4 * p.validity_words},
+       {"value ranges of further fields", MoreRanges::bytes(request, p.block_count())},
        {"the start grid", 4 * static_cast<std::int64_t>(p.grid.entries.size())},
        {"the start grid's nodes", 32 * starts}}};
   std::int64_t bytes = request.field_count() * p.texels(o) * texel_bytes(request.storage);
@@ -438,9 +444,9 @@ void add_handles(const BuildRequest& request, const Options& o, const Plan& p, E
   for (const Brick& b : p.bricks) *words++ = packed(p, b.texels(o).size() - Vec3i(1));
 }
 
-Stores make_stores(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& p,
+Stores make_stores(const Encoding& encoding, const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& p,
                    const EncodedField& field) {
-  Stores out;
+  Stores out{{}, {}, {}, MoreRanges(encoding, request, "kd_more_ranges", p.block_count())};
   out.values = o.bindless ? make_brick_textures(o, p, field) : make_pools(p, field);
   out.data = make_buffer("kd_data", TexelFormat::r32ui, p.data_words * p.block_count());
   const bool validity = any_missing(h, request);
@@ -460,9 +466,9 @@ Stores make_stores(const AmrHierarchy& h, const BuildRequest& request, const Opt
   return out;
 }
 
-Stores store_bricks(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& p,
+Stores store_bricks(const Encoding& encoding, const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& p,
                     const EncodedField& field) {
-  Stores out = make_stores(h, request, o, p, field);
+  Stores out = make_stores(encoding, h, request, o, p, field);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, p.bricks.size(), 1), [&](const auto& range) {
     BrickWriter writer(h, request, o, p, field, out);
     for (std::size_t i = range.begin(); i != range.end(); ++i) writer.write(static_cast<int>(i));
@@ -582,7 +588,7 @@ EncodedField KdTree::build(const AmrHierarchy& h, const BuildRequest& request) c
   const Plan p = plan(h, request, o);
 
   EncodedField field = start_field(*this, h, request, parameters);
-  Stores stores = store_bricks(h, request, o, p, field);
+  Stores stores = store_bricks(*this, h, request, o, p, field);
   field.statistics = statistics(o, p);
   add_defines(o, p, field);
   field.left_out = left_out(h, request, o, p);
@@ -596,6 +602,7 @@ EncodedField KdTree::build(const AmrHierarchy& h, const BuildRequest& request) c
   }
   for (HostTexture& texture : stores.values) field.textures.push_back(std::move(texture));
   if (!stores.validity.data.empty()) field.textures.push_back(std::move(stores.validity));
+  stores.more_ranges.move_to(field);
   if (request.needs.draw_boxes) field.draw_tree = make_draw_tree(h, p.tree);
   field.host_peak_bytes = field.memory().total() + static_cast<std::int64_t>(p.tree.nodes.size() * (sizeof(Node) + sizeof(Box))) +
                           field.draw_tree.bytes();

@@ -171,6 +171,9 @@ bool locate(IN(Position) p, OUT(Region) r) {
   r.texture_lower = vec3r(0);
 #endif
   if (data == AMRTEX_KD_NO_DATA) return false;
+#if AMRTEX_CPP || AMRTEX_FIELD_RANGES
+  uint data_node = uint(data);
+#endif
   data *= AMRTEX_KD_DATA_WORDS;
   ivec3 texel = kd_texel_position(kd_data[data]);
   r.handle = ivec4(texel.x, texel.y, texel.z, 0);
@@ -182,6 +185,9 @@ bool locate(IN(Position) p, OUT(Region) r) {
   }
 #endif
   if (AMRTEX_VALUE_RANGES != 0) r.value_range = decode_range(kd_data[data + 1 + AMRTEX_KD_BINDLESS]);
+#if AMRTEX_CPP || AMRTEX_FIELD_RANGES
+  r.brick.w = data_node;
+#endif
   if (AMRTEX_VALIDITY != 0) r.handle.w = int(kd_data[data + AMRTEX_KD_DATA_WORDS - 1]);
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
 #if AMRTEX_KD_BINDLESS
@@ -192,6 +198,14 @@ bool locate(IN(Position) p, OUT(Region) r) {
 #endif
   return true;
 }
+
+#if AMRTEX_CPP || AMRTEX_FIELD_RANGES
+BUFFER(uint, kd_more_ranges, kd_more_ranges_block)  // coded ranges of the further fields, those of a data node side by side
+
+vec2r fetch_range(IN(Region) r, IN(int) field) {
+  return decode_field_range(kd_more_ranges[int(r.brick.w) * (AMRTEX_FIELDS - 1) + field - 1], field);
+}
+#endif
 
 // Cells of a region along each axis.
 ivec3 kd_cells(IN(Region) r) { return divide_by_width(r.upper - r.lower, r.width); }

@@ -528,8 +528,9 @@ std::vector<Box> refined_parts(const AmrHierarchy& h, int level) {
   return parts;
 }
 
-void write_ranges(const AmrHierarchy& h, const BuildRequest& request, const Tree& tree, const TreeReader& reader,
-                  const EncodedField& field, HostTexture& ranges) {
+/// Ranges of field number `number` of all nodes.
+std::vector<ValueRange> ranges_of_nodes(const AmrHierarchy& h, const BuildRequest& request, const Tree& tree,
+                                        const TreeReader& reader, int number) {
   std::vector<ValueRange> of_node(static_cast<std::size_t>(tree.nodes));
   tbb::spin_mutex mutex;  // a node may lie over the face between two parts
   tbb::enumerable_thread_specific<WindowRanges> windows;
@@ -548,7 +549,7 @@ void write_ranges(const AmrHierarchy& h, const BuildRequest& request, const Tree
       const Box& patch = h.patches(level)[part.patch].box;
       const auto mask = h.leaf_mask(level, static_cast<int>(part.patch));
       WindowRanges& window = windows.local();
-      window.read(h, request.field, level, part.box);
+      window.read(h, request.field_at(number), level, part.box);
       for_each_node_of(tree, reader, shift, part.box, [&](std::int64_t node, const Box& cells) {
         ValueRange range;
         for_each_cell(cells, [&](const Vec3i& c) {
@@ -561,7 +562,7 @@ void write_ranges(const AmrHierarchy& h, const BuildRequest& request, const Tree
     const std::vector<Box> refined = refined_parts(h, level);
     tbb::parallel_for(std::size_t{0}, refined.size(), [&](std::size_t k) {
       WindowRanges& window = windows.local();
-      window.read(h, request.field, level, refined[k]);
+      window.read(h, request.field_at(number), level, refined[k]);
       for_each_node_of(tree, reader, shift, refined[k], [&](std::int64_t node, const Box& cells) {
         ValueRange range;
         for_each_cell(cells, [&](const Vec3i& c) { window.add_to(range, c); });
@@ -569,10 +570,19 @@ void write_ranges(const AmrHierarchy& h, const BuildRequest& request, const Tree
       });
     });
   }
-  auto* codes = ranges.as<std::uint32_t>();
-  tbb::parallel_for(std::size_t{0}, of_node.size(), [&](std::size_t i) {
-    codes[i] = encode_range(of_node[i], field.range_origin, request.storage, field.scale);
-  });
+  return of_node;
+}
+
+void write_ranges(const AmrHierarchy& h, const BuildRequest& request, const Tree& tree, const TreeReader& reader,
+                  const EncodedField& field, HostTexture& ranges, MoreRanges& more) {
+  for (int number = 0; number < (more.needed() ? field.field_count : 1); ++number) {
+    const std::vector<ValueRange> of_node = ranges_of_nodes(h, request, tree, reader, number);
+    auto* codes = ranges.as<std::uint32_t>();
+    tbb::parallel_for(std::size_t{0}, of_node.size(), [&](std::size_t i) {
+      if (number == 0) codes[i] = encode_range(of_node[i], field.range_origin, request.storage, field.scale);
+      more.set(field, static_cast<std::int64_t>(i), number, of_node[i]);
+    });
+  }
 }
 
 // ---- gradients of the layout `rgba8`
@@ -775,7 +785,7 @@ Plan Octree::plan(const AmrHierarchy& h, const BuildRequest& request, const Opti
   p.bytes = tree_bytes + (p.start_slots ? 8 : 4) * p.start_cells();
   if (p.lod_texture) p.bytes += fields * in_texture * value_bytes;
   if (p.validity) p.bytes += 4 * words_for_bits(8 * tree.nodes);
-  if (p.ranges) p.bytes += 4 * tree.nodes;
+  if (p.ranges) p.bytes += 4 * tree.nodes + MoreRanges::bytes(request, tree.nodes);
   const std::int64_t largest = p.ranges ? 4 * tree.nodes : p.validity ? 4 * words_for_bits(8 * tree.nodes) : 0;
   if (largest > request.context.max_buffer_bytes)
     throw UnsupportedError(
@@ -893,7 +903,10 @@ EncodedField Octree::build(const AmrHierarchy& h, const BuildRequest& request) c
   if (p.start_cells() > 0) write_start_grid(tree, reader, p, stores);
   const bool gradients = o.paper_layout && o.store_gradients && request.needs.gradients;
   if (gradients) write_gradients(h, request, tree, reader, stores.nodes);
-  if (p.ranges) write_ranges(h, request, tree, reader, field, stores.ranges);
+  BuildRequest ranged = request;
+  ranged.needs.field_ranges = request.needs.field_ranges && p.ranges;  // nearest: a leaf's range is its value
+  MoreRanges more_ranges(*this, ranged, "octree_more_ranges", tree.nodes);
+  if (p.ranges) write_ranges(h, request, tree, reader, field, stores.ranges, more_ranges);
   const Counts counts{tree.leaves, tree.nodes - 1, 7 * tree.nodes + 1 - tree.leaves};
   set_roles(o, tree, p, counts, stores);
   for (HostTexture& t : more) {  // as those of the first field
@@ -908,6 +921,7 @@ EncodedField Octree::build(const AmrHierarchy& h, const BuildRequest& request) c
        {&stores.nodes, &stores.values, &stores.lod, &stores.validity, &stores.start, &stores.start_slots, &stores.ranges})
     if (!t->data.empty()) field.textures.push_back(std::move(*t));
   for (HostTexture& t : more) field.textures.push_back(std::move(t));
+  more_ranges.move_to(field);
   std::int64_t working = p.ranges ? tree.nodes * static_cast<std::int64_t>(sizeof(ValueRange)) : 0;
   if (tree.visible) working += tree.visible->host_bytes();
   field.host_peak_bytes = field.memory().total() + working + static_cast<std::int64_t>(subtrees.size() * sizeof(Subtree));

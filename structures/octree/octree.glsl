@@ -84,6 +84,9 @@ BUFFER(uint, octree_validity, octree_validity_block)  // one bit a slot: a leaf 
 #if AMRTEX_CPP || (AMRTEX_VALUE_RANGES && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST)
 BUFFER(uint, octree_ranges, octree_ranges_block)  // one code a node: of all that its leaves can return
 #endif
+#if AMRTEX_CPP || (AMRTEX_FIELD_RANGES && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST)
+BUFFER(uint, octree_more_ranges, octree_more_ranges_block)  // the same of the further fields, those of a node side by side
+#endif
 UNIFORM(ivec3, u_octree_shift)  // log2 of nodes along x and y of their 3D textures
 
 // ---- addresses. Tree space: finest cells from the tree's lower corner, unsigned, since ghosts
@@ -317,6 +320,17 @@ bool locate(IN(Position) p, OUT(Region) r) {
   }
   return inside;
 }
+
+#if AMRTEX_CPP || AMRTEX_FIELD_RANGES
+// Of another field in a region with a value.
+vec2r fetch_range(IN(Region) r, IN(int) field) {
+#if AMRTEX_CPP || AMRTEX_FILTER != AMRTEX_FILTER_NEAREST
+  if (AMRTEX_FILTER != AMRTEX_FILTER_NEAREST)
+    return decode_field_range(octree_more_ranges[r.handle.x * (AMRTEX_FIELDS - 1) + field - 1], field);
+#endif
+  return vec2r(octree_leaf_value(r, field));
+}
+#endif
 
 // ---- the eight values of linear_lod
 

@@ -405,7 +405,8 @@ Sizes PageTable::sizes(std::int64_t stored, const Options& o, const TablePlan& t
         fmt::format("encoding page_table with page_size {}: {} pages, an entry of the table numbers at most {}", o.page_size,
                     stored, kMostPages));
   const std::int64_t pool_bytes = fields * s.pool_texels() * texel_bytes(request.storage);
-  require_budget(*this, pool_bytes + table.top_bytes() + table.sub_bytes() + validity_bytes, request);
+  require_budget(*this, pool_bytes + table.top_bytes() + table.sub_bytes() + validity_bytes + MoreRanges::bytes(request, stored),
+                 request);
   return s;
 }
 
@@ -535,11 +536,12 @@ Json statistics(const AmrHierarchy& h, const Options& o, const std::vector<Page>
 struct Storages {
   std::vector<HostTexture> pools;  ///< one a field, all laid out in the same way
   HostTexture validity;            ///< without data where every cell has a value
+  MoreRanges more_ranges;
 };
 
-Storages make_storages(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Sizes& size,
-                       const EncodedField& field, const std::vector<Page>& pages) {
-  Storages out;
+Storages make_storages(const Encoding& encoding, const AmrHierarchy& h, const BuildRequest& request, const Options& o,
+                       const Sizes& size, const EncodedField& field, const std::vector<Page>& pages) {
+  Storages out{{}, {}, MoreRanges(encoding, request, "page_more_ranges", size.stored)};
   for (int number = 0; number < field.field_count; ++number) {
     HostTexture& pool =
         out.pools.emplace_back(make_texture(element_name("tex_pages", number), field.storage, size.pool.texels()));
@@ -559,7 +561,8 @@ class PageWriter {
              Storages& out)
       : request_(request), options_(o), size_(size), field_(field), out_(out), reader_(h, o) {
     const HostTexture& pool = out.pools.front();
-    if (pool.hardware_linear && o.nodes) leak_ = leaked_value(h.statistics(request.field), pool.size);
+    for (int number = 0; number < field.field_count; ++number)
+      leak_.push_back(pool.hardware_linear && o.nodes ? leaked_value(h.statistics(request.field_at(number)), pool.size) : 0);
   }
 
   void write(Page& page) {
@@ -569,6 +572,7 @@ class PageWriter {
                  out_.pools[static_cast<std::size_t>(number)]);
       if (!out_.validity.data.empty()) reader_.write_validity(page, validity_words(page, number));
       if (number == 0 && request_.needs.value_ranges) page.green = coded_range(contents);
+      out_.more_ranges.set(field_, page.index, number, range_of(contents, number));
     }
   }
 
@@ -577,10 +581,12 @@ class PageWriter {
   std::uint32_t* validity_words(const Page& page, int number) {
     return out_.validity.as<std::uint32_t>() + (page.index * field_.field_count + number) * options_.page_words();
   }
-  std::uint32_t coded_range(const PageContents& c) const {
-    if (!c.any) return kVacantRange;
-    return encode_range({c.range.min - leak_, c.range.max + leak_}, field_.range_origin, request_.storage, field_.scale);
+  /// Of what a field can return in a page; empty where it has no value.
+  ValueRange range_of(const PageContents& c, int number) const {
+    const double leak = leak_[static_cast<std::size_t>(number)];
+    return c.any ? ValueRange{c.range.min - leak, c.range.max + leak} : ValueRange{};
   }
+  std::uint32_t coded_range(const PageContents& c) const { return encode_range(field_, 0, range_of(c, 0)); }
 
   const BuildRequest& request_;
   const Options& options_;
@@ -588,13 +594,13 @@ class PageWriter {
   const EncodedField& field_;
   Storages& out_;
   PageReader reader_;
-  double leak_ = 0;
+  std::vector<double> leak_;  ///< of each field
 };
 
 /// Reads the stored pages once more, to store them.
-Storages store_pages(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Sizes& size,
-                     const EncodedField& field, std::vector<Page>& pages) {
-  Storages out = make_storages(h, request, o, size, field, pages);
+Storages store_pages(const Encoding& encoding, const AmrHierarchy& h, const BuildRequest& request, const Options& o,
+                     const Sizes& size, const EncodedField& field, std::vector<Page>& pages) {
+  Storages out = make_storages(encoding, h, request, o, size, field, pages);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pages.size(), 8), [&](const auto& range) {
     PageWriter writer(h, request, o, size, field, out);
     for (std::size_t i = range.begin(); i != range.end(); ++i)
@@ -663,7 +669,7 @@ EncodedField PageTable::build(const AmrHierarchy& h, const BuildRequest& request
 
   EncodedField field = start_field(*this, h, request, parameters);
   if (request.needs.filter == Filter::linear_page) field.definition.page_size = o.page_size;
-  Storages stores = store_pages(h, request, o, size, field, pages);
+  Storages stores = store_pages(*this, h, request, o, size, field, pages);
   field.statistics = statistics(h, o, pages, table, stored);
   add_shader_inputs(h, o, table, size, constants, field);
   const auto pruned = std::count_if(pages.begin(), pages.end(), [](const Page& p) { return p.pruned; });
@@ -671,6 +677,7 @@ EncodedField PageTable::build(const AmrHierarchy& h, const BuildRequest& request
   field.textures = make_table(h, table, pages);
   for (HostTexture& pool : stores.pools) field.textures.push_back(std::move(pool));
   if (validity) field.textures.push_back(std::move(stores.validity));
+  stores.more_ranges.move_to(field);
   if (request.needs.draw_boxes) field.draw_tree = PageDrawTree(h, o.page_size, pages).tree();
   field.host_peak_bytes =
       field.memory().total() + static_cast<std::int64_t>(pages.size() * sizeof(Page)) + field.draw_tree.bytes();

@@ -55,6 +55,14 @@ int page_entry_kind(IN(uint) red) { return int(red >> uint(AMRTEX_PAGE_INDEX_BIT
 int page_entry_level(IN(uint) red) { return int((red >> uint(AMRTEX_PAGE_INDEX_BITS)) & uint((1 << AMRTEX_PAGE_LEVEL_BITS) - 1)); }
 int page_entry_index(IN(uint) red) { return int(red & uint((1 << AMRTEX_PAGE_INDEX_BITS) - 1)); }
 
+#if AMRTEX_CPP || AMRTEX_FIELD_RANGES
+BUFFER(uint, page_more_ranges, page_more_ranges_block)  // coded ranges of the further fields, those of a page side by side
+
+vec2r fetch_range(IN(Region) r, IN(int) field) {
+  return decode_field_range(page_more_ranges[r.handle.w * (AMRTEX_FIELDS - 1) + field - 1], field);
+}
+#endif
+
 bool locate(IN(Position) p, OUT(Region) r) {
   ivec3 t = divide_by_width(p.cell, u_page_table.x);
   uvec4 entry = texelFetch(tex_page_table, t, 0);

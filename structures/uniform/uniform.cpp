@@ -32,6 +32,7 @@ struct Plan {
   bool validity;
   bool may_border;  ///< the filter reads one where cells are missing
   bool ranges;
+  std::int64_t more_ranges;  ///< bytes of those of further fields
   int border;     ///< texels round the domain: the fills of cells outside, which clamping gives only where no cell is missing
   bool vertices;  ///< texels are vertices, not cells
   Box texels() const { return vertices ? Box{Vec3i(0), cells + Vec3i(1)} : Box{Vec3i(0), cells}.grown(border); }
@@ -41,7 +42,7 @@ struct Plan {
   std::int64_t validity_words() const { return fields * words_for_bits(cell_count()); }
   std::int64_t bytes(Storage storage) const {
     return fields * texels().cells() * texel_bytes(storage) + (validity ? 4 * validity_words() : 0) +
-           (ranges ? 4 * block_count() : 0);
+           (ranges ? 4 * block_count() : 0) + more_ranges;
   }
 };
 
@@ -80,6 +81,7 @@ Plan Uniform::plan(const AmrHierarchy& h, const BuildRequest& request, const Jso
   p.fields = request.field_count();
   p.validity = any_missing(h, request);
   p.ranges = request.needs.value_ranges;
+  p.more_ranges = MoreRanges::bytes(request, p.block_count());
   p.vertices = request.needs.filter == Filter::linear_vertex;
   p.may_border = request.needs.filter == Filter::linear_page;
   p.border = p.may_border && (request.needs.keeps_border() || cells_missing(h, request)) ? 1 : 0;
@@ -107,6 +109,7 @@ struct Storages {
   std::vector<HostTexture> values;  ///< one a field
   HostTexture validity;             ///< without data where every cell has a value
   HostTexture ranges;               ///< without data where no region is skipped
+  MoreRanges more_ranges;
 };
 
 /// Writes the blocks of the structure: values, which cells are missing, ranges.
@@ -124,6 +127,7 @@ class Writer {
       const Contents contents = write_values(b, number);
       mesh = mesh || contents.any;
       if (number == 0 && contents.any) range = encode_range(contents.range, field_.range_origin, request_.storage, field_.scale);
+      out_.more_ranges.set(field_, Box{Vec3i(0), plan_.blocks}.offset(b), number, contents.any ? contents.range : ValueRange{});
     }
     if (plan_.ranges) out_.ranges.as<std::uint32_t>()[Box{Vec3i(0), plan_.blocks}.offset(b)] = mesh ? range : kNoRange;
   }
@@ -222,8 +226,8 @@ class Writer {
   std::vector<std::uint8_t> missing_;  ///< a byte a cell of each field
 };
 
-Storages make_storages(const Plan& p, const EncodedField& field) {
-  Storages out;
+Storages make_storages(const Encoding& encoding, const BuildRequest& request, const Plan& p, const EncodedField& field) {
+  Storages out{{}, {}, {}, MoreRanges(encoding, request, "dense_more_ranges", p.block_count())};
   for (int number = 0; number < p.fields; ++number) {
     HostTexture& t = out.values.emplace_back(make_texture(element_name("tex_dense", number), field.storage, p.texels().size()));
     t.hardware_linear = field.filtering == Filtering::hardware;
@@ -240,7 +244,7 @@ EncodedField Uniform::build(const AmrHierarchy& h, const BuildRequest& request) 
   if (!request.needs.draw_boxes) return build_blocks(h, request);
   // the texture is one box; value ranges would divide it in regions
   BuildRequest whole = request;
-  whole.needs.value_ranges = false;
+  whole.needs.value_ranges = whole.needs.field_ranges = false;
   EncodedField field = build_blocks(h, whole);
   field.draw_tree.nodes.emplace_back();
   field.draw_tree.set_box(0, h.domain(h.finest_level()), field.build_parameters.at("level"));
@@ -261,7 +265,7 @@ EncodedField Uniform::build_blocks(const AmrHierarchy& h, const BuildRequest& re
   field.shader.defines.emplace_back("AMRTEX_DENSE_VERTICES", p.vertices ? 1 : 0);
   field.integer_uniforms = {{"u_dense_cells", p.cells}, {"u_dense_blocks", p.blocks}};
 
-  Storages out = make_storages(p, field);
+  Storages out = make_storages(*this, request, p, field);
   Writer writer(h, request, p, field, out);
   tbb::parallel_for(std::int64_t{0}, p.block_count(), [&](std::int64_t i) {
     const auto x = static_cast<int>(i % p.blocks.x);
@@ -287,6 +291,7 @@ EncodedField Uniform::build_blocks(const AmrHierarchy& h, const BuildRequest& re
     field.left_out.push_back({"value ranges",
                               request.needs.draw_boxes ? "the domain is drawn as one box" : "no region is skipped",
                               4 * p.block_count(), request.needs.draw_boxes ? Part::none : Part::value_ranges});
+  out.more_ranges.move_to(field);
   field.statistics = {{"blocks", p.block_count()}};
   return field;
 }

@@ -25,6 +25,16 @@ BUFFER(uint, dense_validity, dense_validity_block)  // one bit a cell, x fastest
 BUFFER(uint, dense_ranges, dense_ranges_block)  // coded value range a block
 #endif
 
+#if AMRTEX_CPP || AMRTEX_FIELD_RANGES
+BUFFER(uint, dense_more_ranges, dense_more_ranges_block)  // those of the further fields, side by side
+
+vec2r fetch_range(IN(Region) r, IN(int) field) {
+  ivec3 block = ivec3(r.handle.x, r.handle.y, r.handle.z) / AMRTEX_DENSE_BLOCK;
+  int index = block.x + u_dense_blocks.x * (block.y + u_dense_blocks.y * block.z);
+  return decode_field_range(dense_more_ranges[index * (AMRTEX_FIELDS - 1) + field - 1], field);
+}
+#endif
+
 // Where q = 0 lies in the texture, in texels: a cell's centre is its texel's; a vertex sits on the corner, half a texel from its own.
 vec3r dense_first_texel(IN(ivec3) first) {
   return vec3r(first + ivec3(AMRTEX_DENSE_BORDER)) + (AMRTEX_DENSE_VERTICES != 0 ? vec3r(0.5) : vec3r(0));
