@@ -121,6 +121,15 @@ HostTexture make_buffer(std::string name, TexelFormat format, std::int64_t eleme
   return t;
 }
 
+void write_box(const Box& box, std::uint32_t fourth, std::uint32_t eighth, std::uint32_t* words) {
+  for (int a = 0; a < 3; ++a) {
+    words[a] = static_cast<std::uint32_t>(box.lower[a]);
+    words[4 + a] = static_cast<std::uint32_t>(box.upper[a]);
+  }
+  words[3] = fourth;
+  words[7] = eighth;
+}
+
 bool power_of_two_ratios(const AmrHierarchy& hierarchy) {
   for (int l = 0; l < hierarchy.finest_level(); ++l) {
     const int r = hierarchy.ratio_to_finer(l);

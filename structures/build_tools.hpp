@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "encoding.hpp"
 
@@ -62,6 +63,17 @@ void store_values(Storage storage, StorageScale scale, const double* values, std
 /// An allocated, zeroed texture or buffer.
 HostTexture make_texture(std::string name, TexelFormat format, const Vec3i& size);
 HostTexture make_buffer(std::string name, TexelFormat format, std::int64_t elements);
+
+/// Writes a box as two times four words: lower corner and `fourth`, upper corner and `eighth`.
+void write_box(const Box& box, std::uint32_t fourth, std::uint32_t eighth, std::uint32_t* words);
+
+/// What a border of one cell around each brick would take in all fields. Bricks have their `cells` (a Box).
+template <class Bricks>
+LeftOut border_left_out(const Bricks& bricks, std::string why, const BuildRequest& request) {
+  std::int64_t texels = 0;
+  for (const auto& brick : bricks) texels += brick.cells.grown(1).cells() - brick.cells.cells();
+  return {"border layer", std::move(why), texels * request.field_count() * texel_bytes(request.storage), Part::border};
+}
 
 /// Words of 32 bits for `bits` bits.
 constexpr std::int64_t words_for_bits(std::int64_t bits) { return (bits + 31) / 32; }

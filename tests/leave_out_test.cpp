@@ -97,11 +97,17 @@ std::vector<PartRow> part_rows() {
        {{"layout", "rgba8"}}},
       {"kd_tree", "validity bits", all, "kd_validity", "AMRTEX_VALIDITY", needed, validity},
       {"kd_tree", "value ranges", all, "", "AMRTEX_VALUE_RANGES", unskipped, needed},
-      {"kd_tree", "border layer", {nearest}, "", "", needed, border},
+      {"kd_tree", "border layer", {nearest, basis}, "", "", needed, border},
       {"exabricks", "validity bits", all, "exa_validity", "AMRTEX_EXA_MISSING", needed, validity},
       {"exabricks", "value ranges", all, "exa_ranges", "AMRTEX_VALUE_RANGES", unskipped, needed},
       {"exabricks", "border layer", {nearest}, "", "", needed, border},
-      {"kd_tree", "refined parts of subgrids", all, "kd_detail", "AMRTEX_LEVEL_OF_DETAIL", needed, detail},
+      {"kd_tree",
+       "refined parts of subgrids",
+       {nearest, linear_lod, linear_vertex},
+       "kd_detail",
+       "AMRTEX_LEVEL_OF_DETAIL",
+       needed,
+       detail},
   };
 }
 
@@ -460,6 +466,41 @@ std::vector<KdLeaf> kd_leaves(const AmrHierarchy& h, const EncodedField& f) {
   return leaves;
 }
 
+/// Do hats of one leaf's cells reach into another leaf? They end half a cell beyond the cell.
+bool reaches(const AmrHierarchy& h, const KdLeaf& from, const KdLeaf& to) {
+  const int w = h.cell_width(from.level), v = h.cell_width(to.level);
+  for (int a = 0; a < 3; ++a)
+    if ((2 * from.cells.lower[a] - 1) * w >= 2 * to.cells.upper[a] * v ||
+        (2 * from.cells.upper[a] + 1) * w <= 2 * to.cells.lower[a] * v)
+      return false;
+  return true;
+}
+
+/// Under `basis` a leaf shows something where the cells do whose hats reach in; and what it reads is needed.
+std::vector<bool> needed_by_hats(const AmrHierarchy& h, const EncodedField& f, const TransferFunction& tf,
+                                 const std::vector<KdLeaf>& leaves) {
+  std::vector<bool> needed(leaves.size());
+  const HostTexture& pool = *f.find("tex_kd_pool");
+  for (const KdLeaf& leaf : leaves) {
+    ValueRange range;
+    std::vector<std::size_t> read;
+    for (std::size_t i = 0; i < leaves.size(); ++i) {
+      const KdLeaf& other = leaves[i];
+      if (!reaches(h, other, leaf)) continue;
+      read.push_back(i);
+      for_each_cell(other.cells, [&](const Vec3i& c) {
+        const KdLeaf one{{c, c + Vec3i(1)}, other.level, {}};
+        if (!reaches(h, one, leaf)) return;
+        const Vec3i texel = other.texel + c - other.cells.lower;
+        range.add(load_value(pool.format, f.scale, pool.data.data(), Box{Vec3i(0), pool.size}.offset(texel)));
+      });
+    }
+    if (tf.max_extinction(range.min, range.max) > 0)
+      for (const std::size_t i : read) needed[i] = true;
+  }
+  return needed;
+}
+
 /// Of a subgrid is stored the box around its leaves, or around those that show something.
 BruteForce hidden_bricks(const AmrHierarchy& h, const EncodedField& f, const TransferFunction& tf) {
   const bool vertices = f.definition.filter == Filter::linear_vertex;
@@ -470,12 +511,18 @@ BruteForce hidden_bricks(const AmrHierarchy& h, const EncodedField& f, const Tra
     if (!added) it->second = {glm::min(it->second.lower, box.lower), glm::max(it->second.upper, box.upper)};
   };
   std::map<std::pair<int, int>, Box> all, shown;
-  for (const KdLeaf& leaf : kd_leaves(h, f)) {
+  const std::vector<KdLeaf> leaves = kd_leaves(h, f);
+  std::vector<bool> needed;
+  if (f.definition.filter == Filter::basis) needed = needed_by_hats(h, f, tf, leaves);
+  for (std::size_t i = 0; i < leaves.size(); ++i) {
+    const KdLeaf& leaf = leaves[i];
     const std::pair brick(leaf.level, h.find_patch(leaf.level, leaf.cells.lower));
     around(all, brick, leaf.cells);
     const Box texels = texels_of(leaf.cells);
     const Vec3i shift = leaf.texel - leaf.cells.lower;
-    if (shows(tf, f, *f.find("tex_kd_pool"), {texels.lower + shift, texels.upper + shift})) around(shown, brick, leaf.cells);
+    const bool read =
+        needed.empty() ? shows(tf, f, *f.find("tex_kd_pool"), {texels.lower + shift, texels.upper + shift}) : needed[i];
+    if (read) around(shown, brick, leaf.cells);
   }
   BruteForce count;
   for (const auto& [brick, box] : all) count.all += texels_of(box).cells();

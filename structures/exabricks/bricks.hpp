@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "structures/amr_hierarchy.hpp"
+#include "structures/hat_supports.hpp"
 
 namespace amrtex::exa {
 
@@ -82,15 +83,8 @@ struct Brick {
   Box box() const { return cells.refined(width); }
 };
 
-/// Does any hat of the brick's cells reach into the box (finest cells)? Hats end half a cell beyond their cell, faces excluded.
-inline bool reaches(const Box& brick_box, int width, const Box& box) {
-  for (int a = 0; a < 3; ++a) {
-    if (2 * std::int64_t{brick_box.lower[a]} - width >= 2 * std::int64_t{box.upper[a]}) return false;
-    if (2 * std::int64_t{brick_box.upper[a]} + width <= 2 * std::int64_t{box.lower[a]}) return false;
-  }
-  return true;
-}
-inline bool reaches(const Brick& b, const Box& box) { return reaches(b.box(), b.width, box); }
+/// Does any hat of the brick's cells reach into the box (finest cells)?
+inline bool reaches(const Brick& b, const Box& box) { return hats_reach(b.box(), b.width, box); }
 
 struct BrickNode {
   int first_child = 0;  ///< 0: a leaf; the second child is the next node
@@ -118,13 +112,7 @@ class BrickPartition {
     divide(root, hierarchy_.domain(hierarchy_.finest_level()), std::move(boxes));
     tree_.nodes.emplace_back();
     number(root, 0, hierarchy_.domain(hierarchy_.finest_level()), 0);
-    for (std::size_t i = tree_.nodes.size(); i-- > 0;) {
-      BrickNode& n = tree_.nodes[i];
-      if (n.first_child == 0)
-        n.widest = n.brick < 0 ? 0 : tree_.bricks[static_cast<std::size_t>(n.brick)].width;
-      else
-        n.widest = std::max(at(n.first_child).widest, at(n.first_child + 1).widest);
-    }
+    find_widest(tree_.nodes);
     return std::move(tree_);
   }
 
@@ -140,7 +128,6 @@ class BrickPartition {
   /// Subtrees of fewer boxes are no task of their own.
   static constexpr std::size_t kTask = 64;
 
-  const BrickNode& at(int i) const { return tree_.nodes[static_cast<std::size_t>(i)]; }
   int width(int level) const { return hierarchy_.cell_width(level); }
   Box finest(const CellBox& b) const { return b.cells.refined(width(b.level)); }
 
@@ -228,6 +215,7 @@ class BrickPartition {
     if (part.axis < 0) {
       if (!part.full) return;
       tree_.nodes[node].brick = static_cast<int>(tree_.bricks.size());
+      tree_.nodes[node].widest = width(part.cells.level);
       tree_.bricks.push_back({part.cells.level, width(part.cells.level), part.cells.cells});
       return;
     }
@@ -248,18 +236,5 @@ class BrickPartition {
 };
 
 inline BrickTree build_bricks(const AmrHierarchy& h, int widest_brick) { return BrickPartition(h, widest_brick).build(); }
-
-/// Calls f(brick) for each brick some of whose cells' hats reach into the box, in ascending order.
-template <class F>
-void for_each_reaching(const BrickTree& tree, const Box& box, F&& f, int node = 0) {
-  const BrickNode& n = tree.nodes[static_cast<std::size_t>(node)];
-  if (n.widest == 0 || !reaches(n.box, n.widest, box)) return;
-  if (n.first_child != 0) {
-    for_each_reaching(tree, box, f, n.first_child);
-    for_each_reaching(tree, box, f, n.first_child + 1);
-  } else if (reaches(tree.bricks[static_cast<std::size_t>(n.brick)], box)) {
-    f(n.brick);
-  }
-}
 
 }  // namespace amrtex::exa

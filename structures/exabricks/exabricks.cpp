@@ -45,6 +45,7 @@ struct Plan {
   RegionSet set;
   kd::Packing packing;
   kd::StartGrid grid;
+  SupportList supports;  ///< of bricks, where samples search them
   std::vector<BvhNode> bvh;
   std::vector<std::int64_t> leaf_region;  ///< of an item of the BVH; -1: no mesh
   std::vector<std::int64_t> first_piece;  ///< of a region, among those that are stored
@@ -197,8 +198,11 @@ class Exabricks final : public Encoding {
   std::span<const Filter> filters() const override { return kFilters; }
   std::vector<ParameterInfo> parameters() const override {
     return {
-        {"brick_width", "cells of a brick along an axis, at most", 32,
-         fmt::format("an integer from {} to {}", kNarrowestBrick, kWidestBrick)},
+        {"brick_width",
+         "cells of a brick along an axis, at most",
+         32,
+         fmt::format("an integer from {} to {}", kNarrowestBrick, kWidestBrick),
+         {16, 32, 64}},
         {"border", "texels around a brick that hold its neighbours' cells (filter basis)", 1, "0 or 1"},
         {"locate", "who finds the cells of a sample (filter basis): its region knows them, or each sample searches", "regions",
          "\"regions\" or \"cells\""},
@@ -323,7 +327,7 @@ void Exabricks::require_sizes(const BuildRequest& request, const Options& o, con
        {"the BVH over the regions", 32 * static_cast<std::int64_t>(p.bvh.size())},
        {"the start grid", 4 * static_cast<std::int64_t>(p.grid.entries.size())},
        {"the start grid's nodes", 32 * static_cast<std::int64_t>(p.grid.nodes.size())},
-       {"nodes over the bricks", o.cells ? 32 * static_cast<std::int64_t>(p.tree.nodes.size()) : 0},
+       {"boxes of supports", o.cells ? p.supports.bytes() : 0},
        {"validity bits", 4 * request.field_count() * p.validity_words},
        {"value ranges of further fields", MoreRanges::bytes(request, p.regions())}}};
   const std::string remedy = o.brick_width < kWidestBrick
@@ -340,7 +344,7 @@ void Exabricks::require_sizes(const BuildRequest& request, const Options& o, con
   try {
     require_budget(*this, bytes, request);
   } catch (const BudgetError& e) {
-    throw BudgetError(fmt::format("{}; {} bricks and {} regions{}", e.what(), p.bricks(), p.regions(), remedy));
+    throw BudgetError(fmt::format("{}; {} bricks and {} regions{}", e.what(), p.bricks(), p.regions(), remedy), e.needed_bytes());
   }
 }
 
@@ -364,6 +368,7 @@ Plan Exabricks::plan(const AmrHierarchy& h, const BuildRequest& request, const O
   Plan p;
   p.tree = build_bricks(h, o.brick_width);
   p.set = build_regions(h, p.tree, {o.hats ? o.border : 0, o.hats, !o.cells});
+  if (o.cells) p.supports = SupportList(p.tree.nodes, [](const BrickNode& n) { return static_cast<std::uint32_t>(n.brick + 1); });
   if (p.set.nodes.size() >= std::size_t{1} << AMRTEX_EXA_CHILD_BITS)
     throw UnsupportedError(fmt::format("encoding exabricks: {} nodes over {} regions, a child's index has {} bits",
                                        p.set.nodes.size(), p.regions(), AMRTEX_EXA_CHILD_BITS));
@@ -539,15 +544,6 @@ HostTexture make_nodes(const RegionSet& set) {
   return nodes;
 }
 
-void write_box(const Box& box, std::uint32_t third, std::uint32_t seventh, std::uint32_t* words) {
-  for (int a = 0; a < 3; ++a) {
-    words[a] = static_cast<std::uint32_t>(box.lower[a]);
-    words[4 + a] = static_cast<std::uint32_t>(box.upper[a]);
-  }
-  words[3] = third;
-  words[7] = seventh;
-}
-
 HostTexture make_bvh(const Plan& p) {
   HostTexture bvh = make_buffer("exa_bvh", TexelFormat::rgba32ui, 2 * static_cast<std::int64_t>(p.bvh.size()));
   auto* words = bvh.as<std::uint32_t>();
@@ -559,46 +555,6 @@ HostTexture make_bvh(const Plan& p) {
   }
   return bvh;
 }
-
-/// The bricks' tree depth first, each node with the box of the supports below it, outwards to whole cells; nodes without mesh
-/// left out.
-class BrickNodeWriter {
- public:
-  explicit BrickNodeWriter(const BrickTree& tree) : tree_(tree) { add(0); }
-
-  HostTexture texture() {
-    HostTexture nodes = make_buffer("exa_brick_nodes", TexelFormat::rgba32ui, 2 * static_cast<std::int64_t>(tree_.nodes.size()));
-    auto* words = nodes.as<std::uint32_t>();
-    for (const Entry& e : entries_) {
-      const bool last = e.next == entries_.size();
-      write_box(e.box, static_cast<std::uint32_t>(e.brick + 1), last ? 0U : static_cast<std::uint32_t>(e.next), words);
-      words += 8;
-    }
-    return nodes;
-  }
-
- private:
-  struct Entry {
-    Box box;
-    int brick = -1;
-    std::size_t next = 0;
-  };
-
-  void add(std::size_t node) {
-    const BrickNode& n = tree_.nodes[node];
-    if (n.widest == 0) return;
-    const std::size_t i = entries_.size();
-    entries_.push_back({n.box.grown((n.widest + 1) / 2), n.brick});
-    if (n.first_child != 0) {
-      add(static_cast<std::size_t>(n.first_child));
-      add(static_cast<std::size_t>(n.first_child) + 1);
-    }
-    entries_[i].next = entries_.size();
-  }
-
-  const BrickTree& tree_;
-  std::vector<Entry> entries_;
-};
 
 void add_start_grid(const AmrHierarchy& h, const BuildRequest& request, const Plan& p, const RegionTables& tables,
                     EncodedField& field) {
@@ -689,12 +645,7 @@ std::vector<LeftOut> left_out(const BuildRequest& request, const Options& o, con
     list.push_back({"validity bits", "every cell has a value", 4 * request.field_count() * words_for_bits(p.packing.texels()),
                     Part::validity});
   if (!request.needs.value_ranges) list.push_back({"value ranges", "no region is skipped", 4 * p.regions(), Part::value_ranges});
-  if (!o.hats && o.border == 0) {
-    std::int64_t border = 0;
-    for (const Brick& b : p.tree.bricks) border += b.cells.grown(1).cells() - b.cells.cells();
-    list.push_back({"border layer", "the filter nearest reads one cell",
-                    border * request.field_count() * texel_bytes(request.storage), Part::border});
-  }
+  if (!o.hats && o.border == 0) list.push_back(border_left_out(p.tree.bricks, "the filter nearest reads one cell", request));
   return list;
 }
 
@@ -722,7 +673,7 @@ EncodedField Exabricks::build(const AmrHierarchy& h, const BuildRequest& request
   tables.more_ranges.move_to(field);
   if (o.cells) {
     field.textures.push_back(make_bricks(o, p));
-    field.textures.push_back(BrickNodeWriter(p.tree).texture());
+    field.textures.push_back(p.supports.texture());
   }
   for (HostTexture& pool : stores.pools) field.textures.push_back(std::move(pool));
   if (p.missing) field.textures.push_back(std::move(stores.validity));

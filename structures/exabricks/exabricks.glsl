@@ -60,13 +60,14 @@ BUFFER(uvec4, exa_start_nodes, exa_start_nodes_block)  // two a node: (lower cor
 UNIFORM(ivec3, u_exa_grid)                             // cells of the grid
 UNIFORM(ivec3, u_exa_grid_width)                       // x: width of a cell of the grid, finest cells
 #endif
-#if AMRTEX_CPP || AMRTEX_EXA_CELLS
-BUFFER(uvec4, exa_brick_nodes, exa_brick_nodes_block)  // two a node: (lower corner, brick + 1 or 0), (upper corner, node after those below)
-#endif
 #if AMRTEX_CPP || AMRTEX_EXA_MISSING
 BUFFER(uint, exa_validity, exa_validity_block)  // one bit a texel of the pool, each field from a new word
 #endif
 VALUE_TEXTURES(tex_exa_pool, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)
+
+#define AMRTEX_BASIS_MISSING AMRTEX_EXA_MISSING
+#define AMRTEX_BASIS_SEARCH AMRTEX_EXA_CELLS
+#include "basis.glsl"
 
 // ---- locating
 
@@ -76,7 +77,6 @@ VALUE_TEXTURES(tex_exa_pool, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)
 int exa_axis(IN(uint) word) { return int(word >> uint(AMRTEX_EXA_CHILD_BITS)); }
 int exa_first_child(IN(uint) word) { return int(word & ((1u << uint(AMRTEX_EXA_CHILD_BITS)) - 1u)); }
 int exa_component(IN(ivec3) v, IN(int) axis) { return axis == 0 ? v.x : (axis == 1 ? v.y : v.z); }
-ivec3 exa_corner(IN(uvec4) words) { return ivec3(int(words.x), int(words.y), int(words.z)); }
 
 #if AMRTEX_CPP || AMRTEX_EXA_GRID
 // The entry of the grid's cell about a cell.
@@ -120,8 +120,8 @@ uint exa_search_bvh(IN(ivec3) cell, INOUT(Region) r) {
   do {
     uvec4 lower = exa_bvh[i * 2];
     uvec4 upper = exa_bvh[i * 2 + 1];
-    r.lower = exa_corner(lower);
-    r.upper = exa_corner(upper);
+    r.lower = corner_of(lower);
+    r.upper = corner_of(upper);
     bool holds = all(greaterThanEqual(cell, r.lower)) && all(lessThan(cell, r.upper));
     if (holds) found = lower.w;
     i = holds ? i + 1 : int(upper.w);
@@ -154,8 +154,8 @@ int locate_group(IN(Position) p, INOUT(Region) r) {
     int start = exa_start_at(p.cell);
     uvec4 lower = exa_start_nodes[start * 2];
     uvec4 upper = exa_start_nodes[start * 2 + 1];
-    r.lower = exa_corner(lower);
-    r.upper = exa_corner(upper);
+    r.lower = corner_of(lower);
+    r.upper = corner_of(upper);
     if (AMRTEX_VALUE_RANGES != 0) r.value_range = decode_range(upper.w);
     return int(lower.w);
   }
@@ -205,7 +205,7 @@ void open_region(INOUT(Region) r) {
   r.handle = ivec4(int(store.x), int(store.y), AMRTEX_EXA_CELLS != 0 ? int(place.w) : int(store.z),
                    (store.w & AMRTEX_EXA_PLAIN_FLAG) != 0u ? 0 : int(store.w & flags));
   real inverse_width = real(1) / real(level_width(AMRTEX_LEAF_LEVEL(r)));
-  r.texture_lower = vec3r(r.lower - exa_corner(place)) * inverse_width;
+  r.texture_lower = vec3r(r.lower - corner_of(place)) * inverse_width;
   r.texture_scale = vec3r(real(r.width) * inverse_width);
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
   r.texture_lower = (vec3r(exa_unpack_texel(store.x)) + r.texture_lower) * exa_inverse_pool();
@@ -238,37 +238,30 @@ bool locate(IN(Position) p, OUT(Region) r) {
 
 bool exa_flag(IN(Region) r, IN(uint) flag) { return (uint(r.handle.w) & flag) != 0u; }
 
-// A box of cells of one level.
-STRUCT ExaPiece {
-  vec3r from_corner;  // of the region's lower corner from the piece's, in cell widths of the region
-  real scale;         // cell width of the region over that of the piece
-  ivec3 texel;        // of its first cell
-  ivec3 cells;        // along each axis
-};
-
 #if AMRTEX_CPP || (AMRTEX_FILTER == AMRTEX_FILTER_BASIS && !AMRTEX_EXA_CELLS)
-ExaPiece exa_piece(IN(Region) r, IN(int) index) {
+BasisPiece exa_piece(IN(Region) r, IN(int) index) {
   uvec4 words = exa_pieces[index];
   uint most = (1u << uint(AMRTEX_EXA_OFFSET_BITS)) - 1u;
   ivec3 offset = ivec3(int(words.z & most), int(words.z >> uint(AMRTEX_EXA_OFFSET_BITS)), int(words.w & most));
-  ExaPiece p;
+  BasisPiece p;
   p.from_corner = vec3r(offset - ivec3(1 << (AMRTEX_EXA_OFFSET_BITS - 1)));
   p.scale = real(r.width) * (real(1) / real(level_width(int(words.w >> uint(AMRTEX_EXA_OFFSET_BITS)))));
   p.texel = exa_unpack_texel(words.x);
   p.cells = exa_unpack_size(words.y);
+  p.store = uvec2(0u);
   return p;
 }
 #endif
 
 #if AMRTEX_CPP || AMRTEX_EXA_CELLS
-ExaPiece exa_brick(IN(Region) r, IN(int) brick) {
+BasisPiece exa_brick(IN(Region) r, IN(int) brick) {
   uvec4 place = exa_bricks[brick * 2];
   uvec4 store = exa_bricks[brick * 2 + 1];
-  ExaPiece p;
-  p.from_corner = vec3r(r.lower - exa_corner(place)) * (real(1) / real(r.width));
-  p.scale = real(r.width) * (real(1) / real(level_width(int(place.w))));
+  BasisPiece p;
+  basis_place(r, corner_of(place), level_width(int(place.w)), p);
   p.texel = exa_unpack_texel(store.z);
   p.cells = exa_unpack_size(store.w);
+  p.store = uvec2(0u);
   return p;
 }
 #endif
@@ -285,12 +278,31 @@ bool exa_has_value(IN(int) field, IN(ivec3) texel) {
 }
 #endif
 
-// Between the centres of the texels i and j.
-real exa_between(IN(int) field, IN(ivec3) i, IN(ivec3) j, IN(vec3r) f) {
-  return decode_value(trilinear(exa_texel(field, i), exa_texel(field, ivec3(j.x, i.y, i.z)), exa_texel(field, ivec3(i.x, j.y, i.z)),
-                                exa_texel(field, ivec3(j.x, j.y, i.z)), exa_texel(field, ivec3(i.x, i.y, j.z)),
-                                exa_texel(field, ivec3(j.x, i.y, j.z)), exa_texel(field, ivec3(i.x, j.y, j.z)), exa_texel(field, j), f),
-                      field);
+#if AMRTEX_CPP || AMRTEX_FILTER == AMRTEX_FILTER_BASIS
+real basis_texel(IN(BasisPiece) p, IN(int) field, IN(ivec3) cell) { return exa_texel(field, p.texel + cell); }
+
+#if AMRTEX_CPP || AMRTEX_EXA_MISSING
+bool basis_has_value(IN(BasisPiece) p, IN(int) field, IN(ivec3) cell) { return exa_has_value(field, p.texel + cell); }
+#endif
+
+#if AMRTEX_CPP || AMRTEX_EXA_CELLS
+BasisPiece basis_found(IN(Region) r, IN(int) node) { return exa_brick(r, int(basis_supports[node * 2].w) - 1); }
+#endif
+
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+real basis_filtered(IN(BasisPiece) p, IN(int) field, IN(vec3r) at) { return textureLod(tex_exa_pool[field], at * exa_inverse_pool(), 0.0).x; }
+real basis_widest_texture(IN(BasisPiece) p) { return float(max(AMRTEX_POOL_X, max(AMRTEX_POOL_Y, AMRTEX_POOL_Z))); }
+#endif
+
+// All cells of the region's own brick; where they lie from the region is not told.
+BasisPiece exa_own_brick(IN(Region) r) {
+  BasisPiece own;
+  own.from_corner = vec3r(0);
+  own.scale = real(r.width) * (real(1) / real(level_width(AMRTEX_LEAF_LEVEL(r))));
+  own.texel = exa_unpack_texel(uint(r.handle.x));
+  own.cells = exa_unpack_size(uint(r.handle.y));
+  own.store = uvec2(0u);
+  return own;
 }
 
 // Trilinear in the texels of the region's own brick. Where all hats that reach the region are those of them, that is f.
@@ -298,144 +310,29 @@ real exa_plain_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
   return decode_value(textureLod(tex_exa_pool[field], r.texture_lower + q * r.texture_scale, 0.0).x, field);
 #else
-  ivec3 last = exa_unpack_size(uint(r.handle.y)) - ivec3(2 - AMRTEX_EXA_BORDER);
+  BasisPiece own = exa_own_brick(r);
+  ivec3 last = own.cells - ivec3(2 - AMRTEX_EXA_BORDER);
   PRECISE vec3r scaled = q * r.texture_scale;
   PRECISE vec3r x = scaled + r.texture_lower;
   PRECISE vec3r from_centre = x - vec3r(0.5);
   vec3r whole = clamp(floor(from_centre), vec3r(-AMRTEX_EXA_BORDER), vec3r(last));
   PRECISE vec3r f = from_centre - whole;
-  ivec3 i = exa_unpack_texel(uint(r.handle.x)) + ivec3(whole);
-  return exa_between(field, i, i + ivec3(1), f);
+  ivec3 i = ivec3(whole);
+  return basis_between(own, field, i, i + ivec3(1), f);
 #endif
 }
-
-// Trilinear between the centres of a piece's cells, constant beyond the outer ones; x in cell widths from its corner.
-real exa_clamped_value(IN(ExaPiece) p, IN(int) field, IN(vec3r) x) {
-#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
-  // Past the centre the texture unit would read of another piece's texel: the rounding of its coordinate is kept off.
-  vec3r off = min(vec3r(p.cells - ivec3(1)), vec3r(1)) * (1.1920929e-7 * float(max(AMRTEX_POOL_X, max(AMRTEX_POOL_Y, AMRTEX_POOL_Z))));
-  vec3r inside = clamp(x, vec3r(0.5) + off, vec3r(p.cells) - vec3r(0.5) - off);
-  return decode_value(textureLod(tex_exa_pool[field], (vec3r(p.texel) + inside) * exa_inverse_pool(), 0.0).x, field);
-#else
-  PRECISE vec3r from_centre = clamp(x - vec3r(0.5), vec3r(0), vec3r(p.cells - ivec3(1)));
-  ivec3 i = ivec3(floor(from_centre));
-  PRECISE vec3r f = from_centre - vec3r(i);
-  return exa_between(field, p.texel + i, p.texel + min(i + ivec3(1), p.cells - ivec3(1)), f);
 #endif
-}
 
-// The sum of a piece's hats at x: it grows from 0, half a cell before the piece, to 1 at the first centres.
-real exa_hat_sum(IN(ExaPiece) p, IN(vec3r) x) {
-  PRECISE vec3r below = x + vec3r(0.5);
-  PRECISE vec3r above = vec3r(p.cells) + vec3r(0.5) - x;
-  vec3r w = clamp(min(below, above), vec3r(0), vec3r(1));
-  PRECISE real product = w.x * w.y * w.z;
-  return product;
-}
-
-// One more value with the sum of its hats into (mean so far, hats so far). Not a sum of products that is divided in the end: that
-// rounds a constant field off its constant, and passes the largest float where values come near it.
-void exa_add_weighted(INOUT(vec2r) mean, IN(real) value, IN(real) hats) {
-  mean.y += hats;
-  real share = hats > real(0) ? hats / mean.y : real(0);
-  PRECISE real shift = (value - mean.x) * share;
-  mean.x += shift;
-}
-
-#if AMRTEX_CPP || AMRTEX_EXA_MISSING
-// Has every cell of the piece whose hat reaches x a value?
-bool exa_all_present(IN(ExaPiece) p, IN(int) field, IN(vec3r) x) {
-  ivec3 first = ivec3(floor(x - vec3r(0.5)));
-  bool all_there = true;
-  int k = 0;
-  do {
-    ivec3 c = clamp(first + ivec3(k & 1, (k >> 1) & 1, k >> 2), ivec3(0), p.cells - ivec3(1));
-    all_there = all_there && exa_has_value(field, p.texel + c);
-    k += 1;
-  } while (k < 8);
-  return all_there;
-}
-
-// Adds the piece's hats one by one; those of cells without value are left out.
-void exa_add_present(IN(ExaPiece) p, IN(int) field, IN(vec3r) x, INOUT(vec2r) mean) {
-  PRECISE vec3r from_centre = x - vec3r(0.5);
-  vec3r whole = floor(from_centre);
-  PRECISE vec3r f = from_centre - whole;
-  ivec3 first = ivec3(whole);
-  int k = 0;
-  do {
-    ivec3 corner = ivec3(k & 1, (k >> 1) & 1, k >> 2);
-    ivec3 c = first + corner;
-    bool there = all(greaterThanEqual(c, ivec3(0))) && all(lessThan(c, p.cells));
-    if (there && exa_has_value(field, p.texel + c)) {
-      PRECISE vec3r w = vec3r(corner) * f + vec3r(ivec3(1) - corner) * (vec3r(1) - f);
-      PRECISE real hat = w.x * w.y * w.z;
-      exa_add_weighted(mean, decode_value(exa_texel(field, p.texel + c), field), hat);
-    }
-    k += 1;
-  } while (k < 8);
-}
-
-#if AMRTEX_CPP || AMRTEX_FILTER == AMRTEX_FILTER_BASIS
+#if AMRTEX_CPP || (AMRTEX_FILTER == AMRTEX_FILTER_BASIS && AMRTEX_EXA_MISSING)
 // Has the leaf cell that holds q a value? It is of the region's first piece, or brick.
 bool exa_own_cell_has_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
 #if AMRTEX_CPP
-  ExaPiece own = AMRTEX_EXA_CELLS != 0 ? exa_brick(r, r.handle.z) : exa_piece(r, r.handle.z);
+  return basis_holds_value(AMRTEX_EXA_CELLS != 0 ? exa_brick(r, r.handle.z) : exa_piece(r, r.handle.z), field, q);
 #elif AMRTEX_EXA_CELLS
-  ExaPiece own = exa_brick(r, r.handle.z);
+  return basis_holds_value(exa_brick(r, r.handle.z), field, q);
 #else
-  ExaPiece own = exa_piece(r, r.handle.z);
+  return basis_holds_value(exa_piece(r, r.handle.z), field, q);
 #endif
-  // the middle of a cell of the region's width: never at a face
-  vec3r middle = (floor(q) + vec3r(0.5) + own.from_corner) * own.scale;
-  return exa_has_value(field, own.texel + clamp(ivec3(floor(middle)), ivec3(0), own.cells - ivec3(1)));
-}
-#endif
-#endif
-
-vec3r exa_piece_position(IN(ExaPiece) p, IN(vec3r) q) {
-  PRECISE vec3r x = (q + p.from_corner) * p.scale;
-  return x;
-}
-
-void exa_add_piece(IN(Region) r, IN(ExaPiece) p, IN(int) field, IN(vec3r) q, INOUT(vec2r) mean) {
-  vec3r x = exa_piece_position(p, q);
-#if AMRTEX_CPP || AMRTEX_EXA_MISSING
-  if (AMRTEX_EXA_MISSING != 0 && exa_flag(r, AMRTEX_EXA_MISSING_FLAG)) {
-    if (!exa_all_present(p, field, x)) {
-      exa_add_present(p, field, x, mean);
-      return;
-    }
-  }
-#endif
-  exa_add_weighted(mean, exa_clamped_value(p, field, x), exa_hat_sum(p, x));
-}
-
-#if AMRTEX_CPP || AMRTEX_EXA_CELLS
-// The next brick whose cells' hats may reach q, from node i of the bricks' tree on: boxes of supports, depth first; what does not hold q is
-// passed over. -1: there is none. i becomes the node after it, 0 at the end.
-int exa_next_brick(IN(Region) r, IN(vec3r) q, INOUT(int) i) {
-  vec3r place = q * real(r.width);
-  int brick = -1;
-  do {
-    uvec4 lower = exa_brick_nodes[i * 2];
-    uvec4 upper = exa_brick_nodes[i * 2 + 1];
-    bool holds = all(greaterThan(place, vec3r(exa_corner(lower) - r.lower))) && all(lessThan(place, vec3r(exa_corner(upper) - r.lower)));
-    if (holds) brick = int(lower.w) - 1;
-    i = holds && lower.w == 0u ? i + 1 : int(upper.w);
-  } while (i != 0 && brick < 0);
-  return brick;
-}
-
-// f at q after a search from the root, as each sample of Wald et al. 2017 makes it.
-real exa_search_cells(IN(Region) r, IN(int) field, IN(vec3r) q) {
-  vec2r mean = vec2r(0);
-  int i = 0;
-  do {
-    int brick = exa_next_brick(r, q, i);
-    if (brick >= 0) exa_add_piece(r, exa_brick(r, brick), field, q, mean);
-  } while (i != 0);
-  return mean.x;
 }
 #endif
 
@@ -448,19 +345,19 @@ real exa_mean_of_pieces(IN(Region) r, IN(int) field, IN(vec3r) q, IN(real) own) 
   bool reads_own = exa_flag(r, AMRTEX_EXA_OWN_FLAG);
 #if AMRTEX_CPP || AMRTEX_EXA_MISSING
   if (reads_own && AMRTEX_EXA_MISSING != 0 && exa_flag(r, AMRTEX_EXA_MISSING_FLAG)) {
-    ExaPiece marked = exa_piece(r, i);
-    reads_own = exa_all_present(marked, field, exa_piece_position(marked, q));
+    BasisPiece marked = exa_piece(r, i);
+    reads_own = basis_all_present(marked, field, basis_position(marked, q));
     if (reads_own && i + 1 == end) return own;  // what a plain region without the mark has, to the bit
   }
 #endif
   if (reads_own) {
-    ExaPiece first = exa_piece(r, i);
-    exa_add_weighted(mean, own, exa_hat_sum(first, exa_piece_position(first, q)));
+    BasisPiece first = exa_piece(r, i);
+    basis_add_weighted(mean, own, basis_hat_sum(first, basis_position(first, q)));
     i += 1;
   }
   if (i < end) {
     do {
-      exa_add_piece(r, exa_piece(r, i), field, q, mean);
+      basis_add_piece(exa_piece(r, i), field, q, exa_flag(r, AMRTEX_EXA_MISSING_FLAG), mean);
       i += 1;
     } while (i < end);
   }
@@ -483,9 +380,9 @@ real exa_basis_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
   if (AMRTEX_EXA_MISSING != 0 && exa_flag(r, AMRTEX_EXA_MISSING_FLAG) && !exa_own_cell_has_value(r, field, q)) return no_value();
 #endif
 #if AMRTEX_CPP
-  if (AMRTEX_EXA_CELLS != 0) return exa_search_cells(r, field, q);
+  if (AMRTEX_EXA_CELLS != 0) return basis_search(r, field, q, exa_flag(r, AMRTEX_EXA_MISSING_FLAG));
 #elif AMRTEX_EXA_CELLS
-  return exa_search_cells(r, field, q);
+  return basis_search(r, field, q, exa_flag(r, AMRTEX_EXA_MISSING_FLAG));
 #endif
 #if AMRTEX_CPP || (AMRTEX_FILTER == AMRTEX_FILTER_BASIS && !AMRTEX_EXA_CELLS)
   // one fetch for all lanes of a SIMD group: most need nothing else
@@ -508,7 +405,7 @@ STRUCT ExaSlopes {
 };
 
 // Adds the eight hats about x of the texels of `p`, and of `beyond` more around them; `check`: those of cells without value are left out.
-void exa_add_slopes(IN(ExaPiece) p, IN(int) beyond, IN(bool) check, IN(vec3r) x, INOUT(ExaSlopes) slopes) {
+void exa_add_slopes(IN(BasisPiece) p, IN(int) beyond, IN(bool) check, IN(vec3r) x, INOUT(ExaSlopes) slopes) {
   PRECISE vec3r from_centre = x - vec3r(0.5);
   vec3r whole = floor(from_centre);
   PRECISE vec3r f = from_centre - whole;
@@ -534,11 +431,7 @@ void exa_add_slopes(IN(ExaPiece) p, IN(int) beyond, IN(bool) check, IN(vec3r) x,
 #if AMRTEX_CPP || !AMRTEX_EXA_CELLS
 // Of a plain region: its brick's texels as they stand.
 void exa_add_plain_slopes(IN(Region) r, IN(vec3r) q, INOUT(ExaSlopes) slopes) {
-  ExaPiece own;
-  own.from_corner = vec3r(0);
-  own.scale = real(r.width) * (real(1) / real(level_width(AMRTEX_LEAF_LEVEL(r))));
-  own.texel = exa_unpack_texel(uint(r.handle.x));
-  own.cells = exa_unpack_size(uint(r.handle.y));
+  BasisPiece own = exa_own_brick(r);
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
   vec3r x = (r.texture_lower + q * r.texture_scale) / exa_inverse_pool() - vec3r(own.texel);
 #else
@@ -557,10 +450,10 @@ vec3r fetch_gradient(IN(Region) r, IN(vec3r) q) {
   if (AMRTEX_EXA_CELLS != 0) {
     int node = 0;
     do {
-      int brick = exa_next_brick(r, q, node);
-      if (brick >= 0) {
-        ExaPiece found = exa_brick(r, brick);
-        exa_add_slopes(found, 0, check, exa_piece_position(found, q), slopes);
+      int leaf = basis_next(r, q, node);
+      if (leaf >= 0) {
+        BasisPiece found = basis_found(r, leaf);
+        exa_add_slopes(found, 0, check, basis_position(found, q), slopes);
       }
     } while (node != 0);
   }
@@ -571,8 +464,8 @@ vec3r fetch_gradient(IN(Region) r, IN(vec3r) q) {
   if (AMRTEX_EXA_CELLS == 0 && r.handle.w == 0) exa_add_plain_slopes(r, q, slopes);
   if (AMRTEX_EXA_CELLS == 0 && i < end) {
     do {
-      ExaPiece piece = exa_piece(r, i);
-      exa_add_slopes(piece, 0, check, exa_piece_position(piece, q), slopes);
+      BasisPiece piece = exa_piece(r, i);
+      exa_add_slopes(piece, 0, check, basis_position(piece, q), slopes);
       i += 1;
     } while (i < end);
   }

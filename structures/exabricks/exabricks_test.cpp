@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <set>
 
@@ -24,6 +25,7 @@ using namespace test;
 using namespace exa;
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 EncodedField exa_field(const AmrHierarchy& h, Filter filter, const Json& parameters = Json::object(),
                        const BuildOptions& options = {}) {
@@ -191,6 +193,30 @@ TEST(ExabricksRegions, TheBvhFindsEveryBox) {
     }
     EXPECT_EQ(items.size(), boxes.size());
   });
+}
+
+TEST(Exabricks, ALargeMeshHasTheSameBytesAtAnyThreadCount) {
+  // every other block of 2^3 root cells is refined: enough boxes for bricks to be divided as tasks (64), and bricks by the
+  // thousand
+  constexpr int kBlocks = 12;
+  MeshBuilder mesh(Vec3i(2 * kBlocks), {2});
+  mesh.root(waves);
+  for_each_cell({Vec3i(0), Vec3i(kBlocks)}, [&](const Vec3i& b) {
+    if ((b.x + b.y + b.z) % 2 == 0) mesh.patch(1, {b * 4, (b + 1) * 4}, waves);
+  });
+  const AmrHierarchy h = mesh.hierarchy();
+  ASSERT_GT(leaf_boxes(h).size(), 64U);
+  for (const Json& parameters : {Json::object(), Json{{"locate", "cells"}}, Json{{"border", 0}, {"traversal", "bvh"}}}) {
+    SCOPED_TRACE(parameters.dump());
+    std::set<std::string> contents;
+    for (const std::size_t threads : {1, 2, 4}) {
+      const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+      const EncodedField field = exa_field(h, Filter::basis, parameters);
+      EXPECT_GT(field.statistics["bricks"], 1000);
+      contents.insert(field.content_hash() + field.statistics.dump());
+    }
+    EXPECT_EQ(contents.size(), 1U);
+  }
 }
 
 // ---- values
@@ -425,6 +451,13 @@ TEST(ExabricksGradients, AreRefusedWhereAnEncodingHasNone) {
   }
 }
 
+TEST(Exabricks, AdviceComparesWidthsOfBricks) {
+  const std::vector<ParameterInfo> parameters = find_encoding("exabricks").parameters();
+  const auto width = std::find_if(parameters.begin(), parameters.end(), [](const auto& p) { return p.name == "brick_width"; });
+  ASSERT_NE(width, parameters.end());
+  EXPECT_EQ(width->compared, (std::vector<Json>{16, 32, 64}));
+}
+
 // ---- refusals
 
 TEST(Exabricks, ParametersAreRefusedByName) {
@@ -452,8 +485,19 @@ TEST(Exabricks, TooManyRegionsAreCountedAndAWiderBrickSuggested) {
     find_encoding("exabricks").build(h, request);
     ADD_FAILURE() << "built";
   } catch (const BudgetError& e) {
-    EXPECT_THAT(e.what(), AllOf(HasSubstr("512 bricks and 512 regions"), HasSubstr("brick_width above 4")));
+    EXPECT_THAT(e.what(),
+                AllOf(HasSubstr("512 bricks and 512 regions"), HasSubstr("brick_width above 4"), HasSubstr("1000 bytes")));
+    EXPECT_GT(e.needed_bytes(), 32 * 32 * 32 * 4) << "records and advice tell how much is missing";
   }
+  // the widest brick has nothing wider to be named
+  request.parameters = {{"brick_width", 256}};
+  try {
+    find_encoding("exabricks").build(h, request);
+    ADD_FAILURE() << "built";
+  } catch (const BudgetError& e) {
+    EXPECT_THAT(e.what(), AllOf(HasSubstr("1 bricks and 1 regions"), Not(HasSubstr("makes fewer"))));
+  }
+  request.parameters = {{"brick_width", 4}};
   request.memory_limit = std::numeric_limits<std::int64_t>::max();
   request.context.max_buffer_bytes = 4096;  // 512 regions of 32 bytes take 16384
   try {

@@ -59,18 +59,6 @@ struct RegionOptions {
   bool pieces = true;  ///< false: the regions' cells are searched and not kept (Wald et al. 2017)
 };
 
-/// Cells of a level whose hats reach into a box (finest cells).
-inline Box reaching_cells(const Box& box, int width) {
-  Box cells;
-  for (int a = 0; a < 3; ++a) {
-    const std::int64_t w = width;
-    const auto down = [](std::int64_t n, std::int64_t d) { return n >= 0 ? n / d : -((-n + d - 1) / d); };
-    cells.lower[a] = static_cast<int>(down(2 * std::int64_t{box.lower[a]} - w, 2 * w));
-    cells.upper[a] = static_cast<int>(-down(-(2 * std::int64_t{box.upper[a]} + w), 2 * w));
-  }
-  return cells;
-}
-
 /// Divides one brick's box. One object a thread; a brick is one thread's.
 class BrickRegions {
  public:
@@ -93,8 +81,8 @@ class BrickRegions {
     result_.nodes.emplace_back();
     std::vector<int> others;
     if (options_.hats)
-      for_each_reaching(tree_, b.box(), [&](int other) {
-        if (other != brick) others.push_back(other);
+      for_each_reaching(tree_.nodes, b.box(), [&](const BrickNode& n) {
+        if (n.brick != brick) others.push_back(n.brick);
       });
     refine(0, b.box(), others, 0);
     return std::move(result_);

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "kd_hats.hpp"
 #include "kd_partition.hpp"
 #include "structures/build_tools.hpp"
 #include "structures/level_values.hpp"
@@ -17,6 +18,7 @@ namespace amrtex::kd {
 /// How the values of a leaf are stored.
 struct LeafTexels {
   bool vertices = false;  ///< else cells,
+  bool hats = false;      ///< those of other leaves that reach in are read too,
   int border = 0;         ///< and so many more around them
   double leak = 0;        ///< what the texture unit may see of other bricks, field units
 };
@@ -41,17 +43,21 @@ inline ValueRange leaf_range(const AmrHierarchy& h, int field, const Leaf& leaf,
   return {range.min - texels.leak, range.max + texels.leak};
 }
 
-/// One a leaf: can nothing of it be seen?
+/// One a leaf: can nothing of it be seen, and is none of it read by leaves that can?
 inline std::vector<std::uint8_t> hidden_leaves(const AmrHierarchy& h, const BuildRequest& request, const Tree& tree,
                                                const LeafTexels& texels) {
   const FieldStatistics& s = h.statistics(request.field);
   const StorageScale scale = storage_scale(request.storage, s.min, s.max);
   const double origin = range_origin(s, request.storage, scale);
   std::vector<std::uint8_t> hides(tree.leaves.size());
+  std::vector<HatNode> nodes;
+  if (texels.hats) nodes = hat_nodes(h, tree);
   tbb::parallel_for(std::size_t{0}, hides.size(), [&](std::size_t i) {
-    const ValueRange range = leaf_range(h, request.field, tree.leaves[i], texels);
+    ValueRange range = leaf_range(h, request.field, tree.leaves[i], texels);
+    if (texels.hats && !range.empty()) add_reaching_values(h, request.field, tree, nodes, static_cast<int>(i), range);
     hides[i] = hidden(request.needs, range, origin, request.storage, scale) ? 1 : 0;
   });
+  if (texels.hats) keep_read_leaves(h, tree, nodes, hides);
   return hides;
 }
 

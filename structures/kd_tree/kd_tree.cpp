@@ -11,6 +11,7 @@
 #include "hidden_leaves.hpp"
 #include "kd_detail.hpp"
 #include "kd_draw_tree.hpp"
+#include "kd_hats.hpp"
 #include "kd_partition.hpp"
 #include "start_grid.hpp"
 #include "structures/brick_packing.hpp"
@@ -24,7 +25,7 @@ namespace {
 
 using namespace kd;
 
-constexpr std::array<Filter, 3> kFilters{Filter::nearest, Filter::linear_lod, Filter::linear_vertex};
+constexpr std::array<Filter, 4> kFilters{Filter::nearest, Filter::linear_lod, Filter::linear_vertex, Filter::basis};
 
 /// Values are read in blocks of at most so many cells along an axis.
 constexpr int kChunk = 32;
@@ -43,7 +44,8 @@ struct Options {
   bool wrap = false;
   bool detail = false;  ///< refined cells may be drawn
   bool vertices = false;
-  int border = 0;  ///< texels before the first cell of a brick
+  bool hats = false;  ///< each sample searches the leaves whose cells' hats reach it
+  int border = 0;     ///< texels before the first cell of a brick
 };
 
 /// What is stored of one subgrid: the box around its drawn blocks.
@@ -62,6 +64,7 @@ struct Pruned {
   std::int64_t brick_cells = 0;   ///< of bricks, by which the others shrank included
   std::int64_t brick_texels = 0;  ///< the same with borders
   std::int64_t leaf_cells = 0;
+  std::int64_t support_bytes = 0;
 };
 
 struct Plan {
@@ -71,6 +74,8 @@ struct Plan {
   std::vector<int> brick_of;  ///< a leaf
   Packing packing;            ///< bindless: every brick at 0 and the largest extents
   StartGrid grid;
+  std::vector<HatNode> hats;
+  SupportList supports;
   Vec3i position_bits{0};  ///< of a packed position
   int data_words = 1;
   std::int64_t validity_words = 0;
@@ -114,12 +119,14 @@ bool needs_brick_sizes(const BuildRequest& request, const Options& o) {
   return o.bindless && stored_filtering(request) == Filtering::hardware;
 }
 
-/// Node-centred bricks lie side by side without a border: in a brick's last vertex the rounding of the
+/// Bricks of vertices and of hats lie side by side without a border: at a brick's last texel the rounding of the
 /// normalised coordinate (3 times 2^-24 of the pool an axis) lets the texture unit see a little of the next brick.
 double leaked_value(const FieldStatistics& s, const Vec3i& pool) {
   const double weight = 3 * std::ldexp(3.0, -24) * std::max({pool.x, pool.y, pool.z});
   return weight * std::max({s.max - s.min, std::abs(s.min), std::abs(s.max)});
 }
+
+bool may_leak(const Options& o) { return o.vertices || o.hats; }
 
 /// Removes the leaves of which nothing can be seen. A brick is then the box around those that are left.
 Pruned prune(const AmrHierarchy& h, const BuildRequest& request, const Options& o, Tree& tree) {
@@ -133,13 +140,14 @@ Pruned prune(const AmrHierarchy& h, const BuildRequest& request, const Options& 
       pruned.brick_texels += sign * b.texels(o).cells();
     }
     for (const Leaf& leaf : t.leaves) pruned.leaf_cells += sign * leaf.cells.cells();
+    if (o.hats) pruned.support_bytes += sign * SupportList(hat_nodes(h, t), hat_code).bytes();
     pruned.leaves += sign * static_cast<std::int64_t>(t.leaves.size());
   };
   count(tree, 1);
   // the pool's size is not known yet; it is no larger
   const Vec3i largest_pool(request.context.max_3d_texture_size);
-  const double leak = o.vertices ? leaked_value(h.statistics(request.field), largest_pool) : 0;
-  remove_leaves(tree, hidden_leaves(h, request, tree, {o.vertices, o.border, leak}));
+  const double leak = may_leak(o) ? leaked_value(h.statistics(request.field), largest_pool) : 0;
+  remove_leaves(tree, hidden_leaves(h, request, tree, {o.vertices, o.hats, o.border, leak}));
   count(tree, -1);
   return pruned;
 }
@@ -157,7 +165,7 @@ class BrickWriter {
   BrickWriter(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Plan& plan, const EncodedField& field,
               Stores& out)
       : hierarchy_(h), request_(request), options_(o), plan_(plan), field_(field), out_(out) {
-    const bool leaks = field.filtering == Filtering::hardware && o.vertices;
+    const bool leaks = field.filtering == Filtering::hardware && may_leak(o);
     for (int number = 0; number < field.field_count; ++number)
       leak_.push_back(leaks ? leaked_value(h.statistics(request.field_at(number)), plan.packing.size) : 0);
   }
@@ -179,8 +187,9 @@ class BrickWriter {
       store(brick, number);
       note(leaf, chunk, number);
     });
-    if (number == 0 && request_.needs.value_ranges)
-      data_node(leaf)[options_.bindless ? 2 : 1] = encode_range(field_, 0, whole_range(0));
+    if (!request_.needs.value_ranges) return;
+    if (options_.hats) add_reaching_values(hierarchy_, request_.field_at(number), plan_.tree, plan_.hats, leaf, range_);
+    if (number == 0) data_node(leaf)[options_.bindless ? 2 : 1] = encode_range(field_, 0, whole_range(0));
     out_.more_ranges.set(field_, leaf, number, whole_range(number));
   }
 
@@ -260,7 +269,11 @@ class KdTree final : public Encoding {
   std::span<const Filter> filters() const override { return kFilters; }
   std::vector<ParameterInfo> parameters() const override {
     return {
-        {"storage_kind", "where bricks are stored: in one texture, or each in its own", "pool", "\"pool\" or \"bindless\"", {"pool", "bindless"}},
+        {"storage_kind",
+         "where bricks are stored: in one texture, or each in its own",
+         "pool",
+         "\"pool\" or \"bindless\"",
+         {"pool", "bindless"}},
         {"packing", "how bricks are packed into the pool", "best_fit", "\"best_fit\" or \"nfdh\""},
         {"traversal", "where the search for a leaf starts: at a grid's cell, or at the root", "grid", "\"grid\" or \"restart\""},
         {"wrap", "is what lies outside of all subgrids of a node split off before it is divided among them?", true,
@@ -302,6 +315,7 @@ Options KdTree::options(const Json& parameters, const SceneNeeds& needs) const {
   o.wrap = parameters.at("wrap").get<bool>();
   o.detail = needs.level_of_detail;
   o.vertices = needs.filter == Filter::linear_vertex;
+  o.hats = needs.filter == Filter::basis;
   o.border = needs.filter == Filter::linear_lod || (needs.keeps_border() && !o.vertices) ? 1 : 0;
   return o;
 }
@@ -337,12 +351,13 @@ void KdTree::plan_pool(const BuildRequest& request, const Options& o, Plan& p) c
 void KdTree::require_sizes(const BuildRequest& request, const Options& o, const Plan& p) const {
   const auto starts = static_cast<std::int64_t>(p.grid.nodes.size());
   const std::int64_t bricks = o.bindless ? std::max<std::int64_t>(p.brick_count(), 1) : 0;
-  const std::array<std::pair<const char*, std::int64_t>, 9> buffers{
+  const std::array<std::pair<const char*, std::int64_t>, 10> buffers{
       {{"nodes", 8 * p.node_count()},
        {"handles", 8 * bricks * request.field_count()},
        {"brick sizes", needs_brick_sizes(request, o) ? 4 * bricks : 0},
        {"data nodes", 4 * std::max<std::int64_t>(p.data_words * p.block_count(), 1)},
        {"levels of data nodes", request.needs.level_of_detail ? 4 * std::max<std::int64_t>(p.block_count(), 1) : 0},
+       {"boxes of supports", o.hats ? p.supports.bytes() : 0},
        {"validity bits", 4 * p.validity_words},
        {"value ranges of further fields", MoreRanges::bytes(request, p.block_count())},
        {"the start grid", 4 * static_cast<std::int64_t>(p.grid.entries.size())},
@@ -358,9 +373,17 @@ void KdTree::require_sizes(const BuildRequest& request, const Options& o, const 
 }
 
 Plan KdTree::plan(const AmrHierarchy& h, const BuildRequest& request, const Options& o) const {
+  if (o.hats && o.detail)
+    throw UnsupportedError(
+        "encoding kd_tree: no level of detail (level_of_detail, max_level) with filter basis: its hats are of leaf cells; "
+        "accepted: nearest, linear_lod, linear_vertex");
   Plan p;
   p.tree = build_tree(h, {.wrap = o.wrap, .covers = o.detail, .limits = {}});
   p.pruned = prune(h, request, o, p.tree);
+  if (o.hats) {
+    p.hats = hat_nodes(h, p.tree);
+    p.supports = SupportList(p.hats, hat_code);
+  }
   if (o.detail) add_detail_blocks(h, p.tree);
   p.bricks = make_bricks(p.tree, p.brick_of);
   const bool validity = any_missing(h, request);
@@ -499,11 +522,7 @@ void add_start_grid(const AmrHierarchy& h, const Plan& p, EncodedField& field) {
   const std::vector<Box> boxes = node_boxes(h, p.tree);
   auto* words = nodes.as<std::uint32_t>();
   for (const std::uint32_t node : p.grid.nodes) {
-    for (int a = 0; a < 3; ++a) {
-      words[a] = static_cast<std::uint32_t>(boxes[node].lower[a]);
-      words[4 + a] = static_cast<std::uint32_t>(boxes[node].upper[a]);
-    }
-    words[3] = node;
+    write_box(boxes[node], node, 0, words);
     words += 8;
   }
   field.textures.push_back(std::move(entries));
@@ -562,7 +581,8 @@ std::vector<LeftOut> left_out(const AmrHierarchy& h, const BuildRequest& request
   const std::int64_t value_bytes = std::int64_t{request.field_count()} * texel_bytes(request.storage);
   if (p.pruned.leaves > 0)
     list.push_back({"leaves, and what they leave of bricks", "the transfer function hides all that is in them",
-                    p.pruned.brick_texels * value_bytes + 4 * p.data_words * p.pruned.leaves, Part::hidden});
+                    p.pruned.brick_texels * value_bytes + 4 * p.data_words * p.pruned.leaves + p.pruned.support_bytes,
+                    Part::hidden});
   if (!any_missing(h, request)) {
     std::int64_t words = p.block_count();
     for (const Leaf& leaf : p.tree.leaves) words += request.field_count() * words_for_bits(leaf.cells.cells());
@@ -572,11 +592,9 @@ std::vector<LeftOut> left_out(const AmrHierarchy& h, const BuildRequest& request
     list.push_back({"value ranges", "no region is skipped", 4 * p.block_count(), Part::value_ranges});
   if (const std::int64_t cells = undrawn_cells(h, p); cells > 0)
     list.push_back({"refined parts of subgrids", "no level of detail is drawn", cells * value_bytes});
-  if (!o.vertices && o.border == 0) {
-    std::int64_t border = 0;
-    for (const Brick& b : p.bricks) border += b.cells.grown(1).cells() - b.cells.cells();
-    list.push_back({"border layer", "the filter nearest reads one cell", border * value_bytes, Part::border});
-  }
+  if (!o.vertices && o.border == 0)
+    list.push_back(border_left_out(
+        p.bricks, o.hats ? "each sample searches the cells around it" : "the filter nearest reads one cell", request));
   return list;
 }
 
@@ -596,6 +614,7 @@ EncodedField KdTree::build(const AmrHierarchy& h, const BuildRequest& request) c
   field.textures.push_back(std::move(stores.data));
   if (o.detail) field.textures.push_back(make_detail(p.tree));
   if (o.grid) add_start_grid(h, p, field);
+  if (o.hats) field.textures.push_back(p.supports.texture());
   if (o.bindless) {
     add_handles(request, o, p, field);
     add_handle_access(request.context, field);
@@ -604,8 +623,10 @@ EncodedField KdTree::build(const AmrHierarchy& h, const BuildRequest& request) c
   if (!stores.validity.data.empty()) field.textures.push_back(std::move(stores.validity));
   stores.more_ranges.move_to(field);
   if (request.needs.draw_boxes) field.draw_tree = make_draw_tree(h, p.tree);
-  field.host_peak_bytes = field.memory().total() + static_cast<std::int64_t>(p.tree.nodes.size() * (sizeof(Node) + sizeof(Box))) +
-                          field.draw_tree.bytes();
+  field.host_peak_bytes =
+      field.memory().total() +
+      static_cast<std::int64_t>(p.tree.nodes.size() * (sizeof(Node) + sizeof(Box)) + p.hats.size() * sizeof(HatNode)) +
+      field.draw_tree.bytes();
   return field;
 }
 

@@ -1,4 +1,5 @@
-// kd_tree: a descent a region, one filtered fetch a sample and field, from the pool or from the brick's own texture. Words: kd_tree_layout.h.
+// kd_tree: a descent a region, one filtered fetch a sample and field, from the pool or from the brick's own texture; with the filter basis each
+// sample searches the leaves whose cells' hats reach it. Words: kd_tree_layout.h.
 #include "kd_tree/kd_tree_layout.h"
 #if !AMRTEX_CPP
 #ifndef AMRTEX_KD_DEPTH
@@ -65,6 +66,10 @@ BUFFER(uint, kd_detail, kd_detail_block)  // a word a data node: its cells, and 
 BUFFER(uint, kd_validity, kd_validity_block)  // one bit a cell, each field of each data node from a new word
 #endif
 
+#define AMRTEX_BASIS_MISSING AMRTEX_VALIDITY
+#define AMRTEX_BASIS_SEARCH (AMRTEX_FILTER == AMRTEX_FILTER_BASIS)
+#include "basis.glsl"
+
 int kd_axis(IN(uvec2) node) { return int(node.x >> uint(AMRTEX_KD_CHILD_BITS + AMRTEX_KD_LEVEL_BITS)); }
 int kd_level(IN(uvec2) node) { return int((node.x >> uint(AMRTEX_KD_CHILD_BITS)) & uint((1 << AMRTEX_KD_LEVEL_BITS) - 1)); }
 int kd_first_child(IN(uvec2) node) { return int(node.x & uint((1 << AMRTEX_KD_CHILD_BITS) - 1)); }
@@ -79,8 +84,8 @@ int kd_begin(IN(ivec3) cell, INOUT(Region) r) {
     int start = int(kd_start[g.x + u_kd_grid.x * (g.y + u_kd_grid.y * g.z)]);
     uvec4 lower = kd_start_nodes[start * 2];
     uvec4 upper = kd_start_nodes[start * 2 + 1];
-    r.lower = ivec3(int(lower.x), int(lower.y), int(lower.z));
-    r.upper = ivec3(int(upper.x), int(upper.y), int(upper.z));
+    r.lower = corner_of(lower);
+    r.upper = corner_of(upper);
     return int(lower.w);
   }
 #endif
@@ -211,12 +216,16 @@ vec2r fetch_range(IN(Region) r, IN(int) field) {
 ivec3 kd_cells(IN(Region) r) { return divide_by_width(r.upper - r.lower, r.width); }
 
 #if AMRTEX_CPP || AMRTEX_VALIDITY
-bool kd_has_value(IN(Region) r, IN(int) field, IN(ivec3) cell) {
-  ivec3 n = kd_cells(r);
-  ivec3 c = clamp(cell, ivec3(0), n - ivec3(1));
+// Of the cell c of a leaf with n cells, whose bits begin at the word `first`.
+bool kd_bit(IN(int) first, IN(ivec3) n, IN(int) field, IN(ivec3) c) {
   int bit = c.x + n.x * (c.y + n.y * c.z);
   int words = (n.x * n.y * n.z + 31) >> 5;
-  return ((kd_validity[r.handle.w + field * words + (bit >> 5)] >> uint(bit & 31)) & 1u) != 0u;
+  return ((kd_validity[first + field * words + (bit >> 5)] >> uint(bit & 31)) & 1u) != 0u;
+}
+
+bool kd_has_value(IN(Region) r, IN(int) field, IN(ivec3) cell) {
+  ivec3 n = kd_cells(r);
+  return kd_bit(r.handle.w, n, field, clamp(cell, ivec3(0), n - ivec3(1)));
 }
 #endif
 
@@ -283,9 +292,8 @@ void kd_corners(IN(Region) r, IN(int) field, IN(ivec3) i, OUT(vec4r) lower, OUT(
 }
 
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
-real kd_filtered(IN(Region) r, IN(int) field, IN(vec3r) uvw) {
 #if AMRTEX_KD_BINDLESS
-  uvec2 brick = kd_brick(r, field);
+real kd_brick_filtered(IN(uvec2) brick, IN(vec3r) uvw) {
   real value = real(0);
   bool waits = true;
   for (int turn = 0; waits && turn < AMRTEX_HANDLE_TURNS; ++turn) {
@@ -296,10 +304,78 @@ real kd_filtered(IN(Region) r, IN(int) field, IN(vec3r) uvw) {
     }
   }
   return value;
+}
+#endif
+
+real kd_filtered(IN(Region) r, IN(int) field, IN(vec3r) uvw) {
+#if AMRTEX_KD_BINDLESS
+  return kd_brick_filtered(kd_brick(r, field), uvw);
 #else
   return textureLod(tex_kd_pool[field], uvw, 0.0).x;
 #endif
 }
+#endif
+
+#if AMRTEX_CPP || AMRTEX_FILTER == AMRTEX_FILTER_BASIS
+// ---- basis: leaves as pieces. store: the first word of their bits, and the number of their brick (bindless)
+
+BasisPiece basis_found(IN(Region) r, IN(int) node) {
+  uvec4 lower = basis_supports[node * 2];
+  uvec4 upper = basis_supports[node * 2 + 1];
+  uint leaf = lower.w - 1u;
+  int width = level_width(int(leaf >> uint(AMRTEX_KD_DATA_BITS)));
+  int data = int(leaf & uint((1 << AMRTEX_KD_DATA_BITS) - 1)) * AMRTEX_KD_DATA_WORDS;
+  ivec3 reach = ivec3((width + 1) >> 1);  // the box of supports is so much larger than the leaf's
+  ivec3 corner = corner_of(lower) + reach;
+  BasisPiece p;
+  basis_place(r, corner, width, p);
+  p.texel = kd_texel_position(kd_data[data]);
+  p.cells = divide_by_width(corner_of(upper) - reach - corner, width);
+  p.store = uvec2(AMRTEX_VALIDITY != 0 ? kd_data[data + AMRTEX_KD_DATA_WORDS - 1] : 0u, AMRTEX_KD_BINDLESS != 0 ? kd_data[data + 1] : 0u);
+  return p;
+}
+
+#if AMRTEX_CPP || AMRTEX_VALIDITY
+bool basis_has_value(IN(BasisPiece) p, IN(int) field, IN(ivec3) cell) { return kd_bit(int(p.store.x), p.cells, field, cell); }
+#endif
+
+#if AMRTEX_CPP || AMRTEX_KD_BINDLESS
+uvec2 kd_piece_brick(IN(BasisPiece) p, IN(int) field) { return kd_handles[int(p.store.y) * AMRTEX_FIELDS + field]; }
+#endif
+
+real basis_texel(IN(BasisPiece) p, IN(int) field, IN(ivec3) cell) {
+  real value = real(0);
+#if AMRTEX_CPP || AMRTEX_KD_BINDLESS
+  if (AMRTEX_KD_BINDLESS != 0) value = kd_brick_texel(kd_piece_brick(p, field), p.texel + cell);
+#endif
+#if AMRTEX_CPP || !AMRTEX_KD_BINDLESS
+  if (AMRTEX_KD_BINDLESS == 0) value = texelFetch(tex_kd_pool[field], p.texel + cell, 0).x;
+#endif
+  return value;
+}
+
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+#if AMRTEX_KD_BINDLESS
+ivec3 kd_brick_size(IN(BasisPiece) p) { return kd_texel_position(kd_brick_sizes[p.store.y]) + ivec3(1); }
+#endif
+
+real basis_widest_texture(IN(BasisPiece) p) {
+#if AMRTEX_KD_BINDLESS
+  ivec3 size = kd_brick_size(p);
+  return float(max(size.x, max(size.y, size.z)));
+#else
+  return float(max(AMRTEX_POOL_X, max(AMRTEX_POOL_Y, AMRTEX_POOL_Z)));
+#endif
+}
+
+real basis_filtered(IN(BasisPiece) p, IN(int) field, IN(vec3r) at) {
+#if AMRTEX_KD_BINDLESS
+  return kd_brick_filtered(kd_piece_brick(p, field), at / vec3r(kd_brick_size(p)));
+#else
+  return textureLod(tex_kd_pool[field], at * vec3r(1.0 / float(AMRTEX_POOL_X), 1.0 / float(AMRTEX_POOL_Y), 1.0 / float(AMRTEX_POOL_Z)), 0.0).x;
+#endif
+}
+#endif
 #endif
 
 real kd_stored_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
@@ -328,5 +404,11 @@ real fetch_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
 #if AMRTEX_CPP || AMRTEX_VALIDITY
   if (AMRTEX_VALIDITY != 0 && !kd_has_value(r, field, ivec3(floor(q)))) return no_value();
 #endif
+#if AMRTEX_CPP
+  return AMRTEX_FILTER == AMRTEX_FILTER_BASIS ? basis_search(r, field, q, AMRTEX_VALIDITY != 0) : kd_stored_value(r, field, q);
+#elif AMRTEX_FILTER == AMRTEX_FILTER_BASIS
+  return basis_search(r, field, q, AMRTEX_VALIDITY != 0);
+#else
   return kd_stored_value(r, field, q);
+#endif
 }

@@ -19,6 +19,8 @@
 //
 //   13        12          6 5       0
 //   [ last    ][ next     ][ level   ]   next: the coarsest level that takes the cells' place; 2^6: none. last: of the node
+//
+// A leaf of basis_supports (filter basis) tells its data node in the lower AMRTEX_KD_DATA_BITS bits and its level above them, plus 1.
 #define AMRTEX_KD_DETAIL_LAST_BIT 13
 #define AMRTEX_KD_CHILD_BITS 24
 #define AMRTEX_KD_LEVEL_BITS 6
