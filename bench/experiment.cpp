@@ -7,9 +7,12 @@
 #include <array>
 #include <functional>
 #include <limits>
+#include <map>
+#include <memory>
 #include <set>
 
 #include "bench/json_file.hpp"
+#include "renderers/triangle_reader.hpp"
 #include "structures/analytic_fields.hpp"
 #include "structures/error.hpp"
 
@@ -25,20 +28,45 @@ constexpr int kMaxFrames = 1000000;
 constexpr int kMostLevel = 63;
 constexpr double kAnyNumber = std::numeric_limits<double>::max();
 
-constexpr auto kAvailableRenderKeys = std::to_array<std::string_view>(
-    {"mode",         "sampling",    "step",       "width",       "height",           "skip",          "early_end", "consumer",
-     "slice_target", "integrator",  "isovalues",  "iso_opacity", "surface_color",    "iso_tolerance", "shading",   "output",
-     "color_field",  "point_light", "ambient",    "shadow_step", "level_of_detail",  "max_level",     "tolerance", "prune",
-     "needs",        "clip_planes", "ray_offset", "mirror",      "ambient_occlusion"});
+constexpr auto kAvailableRenderKeys = std::to_array<std::string_view>({"mode",
+                                                                       "sampling",
+                                                                       "step",
+                                                                       "width",
+                                                                       "height",
+                                                                       "skip",
+                                                                       "early_end",
+                                                                       "consumer",
+                                                                       "slice_target",
+                                                                       "integrator",
+                                                                       "isovalues",
+                                                                       "iso_opacity",
+                                                                       "surface_color",
+                                                                       "iso_tolerance",
+                                                                       "shading",
+                                                                       "output",
+                                                                       "color_field",
+                                                                       "point_light",
+                                                                       "ambient",
+                                                                       "shadow_step",
+                                                                       "level_of_detail",
+                                                                       "max_level",
+                                                                       "tolerance",
+                                                                       "prune",
+                                                                       "needs",
+                                                                       "clip_planes",
+                                                                       "ray_offset",
+                                                                       "mirror",
+                                                                       "ambient_occlusion",
+                                                                       "triangles"});
 constexpr std::array<std::string_view, 2> kNeeds = {"scene", "all"};
 constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
 
 /// How many lists deep one value of this key is; what lies deeper is an axis.
 int value_depth(std::string_view key) {
   if (key == "extinction" || key == "color" || key == "surface_color" || key == "clip_planes") return 2;
-  constexpr std::array<std::string_view, 11> lists = {"point_light",       "more_fields", "eye",  "at",    "up",
-                                                      "isovalues",         "iso_opacity", "root", "ratio", "skip_levels",
-                                                      "transfer_functions"};
+  constexpr std::array<std::string_view, 12> lists = {"point_light", "more_fields", "eye",         "at",
+                                                      "up",          "isovalues",   "iso_opacity", "root",
+                                                      "ratio",       "skip_levels", "triangles",   "transfer_functions"};
   return std::find(lists.begin(), lists.end(), key) != lists.end() ? 1 : 0;
 }
 
@@ -83,6 +111,8 @@ Json unnamed_render_json(const RenderPoint& render) {
   if (!render.settings.prune) json.erase("prune");  // older records keep their names
   if (!render.settings.everything) json.erase("needs");
   if (!render.settings.ray_offset) json.erase("ray_offset");
+  if (json.contains("triangles"))
+    for (Json& object : json["triangles"]) object.erase("file");
   return json;
 }
 
@@ -363,9 +393,10 @@ class Parser {
     return points;
   }
 
-  static RenderPoint parse_setting(const Choice& choice) {
+  RenderPoint parse_setting(const Choice& choice) {
     RenderPoint point;
     for (const auto& [key, node] : choice) set(point, key, node);
+    if (const JsonNode* node = find(choice, "triangles")) point.settings.triangles = triangles(*node);
     finish_integrator(point.settings, choice);
     if (!point.settings.draws_volume()) point.settings.early_end.reset();                    // no opacity to end at
     if (!point.settings.draws_slices()) point.settings.slice_target = SliceTarget::rgba32f;  // nothing is blended there
@@ -375,6 +406,7 @@ class Parser {
       point.settings.isosurfaces = {};  // other modes have no use for it
     set_light(point.settings, choice);
     if (const JsonNode* mirror = find(choice, "mirror")) located(*mirror, [&] { validate_mirror(point.settings); });
+    if (const JsonNode* node = find(choice, "triangles")) located(*node, [&] { validate_triangles(point.settings); });
     if (const JsonNode* offset = find(choice, "ray_offset")) located(*offset, [&] { validate_ray_offset(point.settings); });
     if (point.settings.prune) require_prunable(point.settings, *find(choice, "prune"));
     return point;
@@ -468,6 +500,33 @@ class Parser {
     if (key == "output") iso.output = located(node, [&] { return parse_output(node.text()); });
     if (key == "ambient_occlusion" && !node.json().is_null()) iso.ambient_occlusion = occlusion(node);
     if (key == "color_field" && !node.json().is_null()) iso.color_field = node.text();
+  }
+
+  /// {"file", "color"}, or a list of them.
+  std::vector<TriangleObject> triangles(const JsonNode& node) {
+    std::vector<TriangleObject> objects;
+    if (node.json().is_null() || (node.json().is_array() && node.json().empty())) return objects;
+    for (const JsonNode& item : node.items()) {
+      item.accept_keys(Names{"file", "color"});
+      TriangleObject& object = objects.emplace_back();
+      const JsonNode file = item.require("file");
+      object.file = file.text();
+      object.mesh = triangle_mesh(file);
+      const auto color = item.find("color");
+      if (!color) continue;
+      const std::vector<JsonNode> rgb = color->items();
+      if (!color->json().is_array() || rgb.size() != 3) color->fail("accepted: [r, g, b], each from 0 to 1");
+      object.color = {rgb[0].number(0, 1), rgb[1].number(0, 1), rgb[2].number(0, 1)};
+    }
+    return objects;
+  }
+
+  /// Each file is read once, however many points draw it.
+  std::shared_ptr<const TriangleMesh> triangle_mesh(const JsonNode& node) {
+    const std::filesystem::path path = existing_path(node);
+    std::shared_ptr<const TriangleMesh>& mesh = triangle_meshes_[path.string()];
+    if (!mesh) located(node, [&] { mesh = std::make_shared<const TriangleMesh>(read_triangles(path)); });
+    return mesh;
   }
 
   /// Planes [a, b, c, d].
@@ -683,7 +742,8 @@ class Parser {
       if (experiment_.explain_error && !experiment_.reference)
         explain->fail("a picture without a reference has no error to explain");
       if (experiment_.explain_error && !experiment_.reference->own)
-        explain->fail("what is explained is the error against the own reference; accepted: false where 'reference' has 'own' false");
+        explain->fail(
+            "what is explained is the error against the own reference; accepted: false where 'reference' has 'own' false");
     }
     if (const auto explain = root_.find("explain_left_out")) experiment_.explain_left_out = explain->boolean();
     if (const auto region = root_.find("region")) parse_region(*region);
@@ -722,6 +782,7 @@ class Parser {
   JsonNode root_;
   bool scene_;
   Experiment experiment_;
+  std::map<std::string, std::shared_ptr<const TriangleMesh>> triangle_meshes_;
 };
 
 Json json_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
@@ -778,6 +839,15 @@ Json clip_planes_json(const std::vector<ClipPlane>& planes) {
   return json;
 }
 
+Json triangles_json(const std::vector<TriangleObject>& objects) {
+  Json json = Json::array();
+  for (const TriangleObject& o : objects)
+    json.push_back({{"hash", o.mesh->content_hash()},
+                    {"triangles", o.mesh->triangles().size()},
+                    {"color", {o.color.r, o.color.g, o.color.b}}});
+  return json;
+}
+
 Json render_json(const RenderPoint& render) {
   const RenderSettings& s = render.settings;
   const bool by_tolerance = s.integrator == Integrator::tolerance;
@@ -805,6 +875,10 @@ Json render_json(const RenderPoint& render) {
   if (s.mirror) json["mirror"] = mirror_name(*s.mirror);
   if (s.ray_offset) json["seed"] = *s.ray_offset;
   if (!s.clip_planes.empty()) json["clip_planes"] = clip_planes_json(s.clip_planes);
+  if (!s.triangles.empty()) {
+    json["triangles"] = triangles_json(s.triangles);
+    for (std::size_t i = 0; i < s.triangles.size(); ++i) json["triangles"][i]["file"] = s.triangles[i].file;
+  }
   if (s.level_of_detail) json["level_of_detail"] = *s.level_of_detail;
   if (s.max_level) json["max_level"] = *s.max_level;
   if (!render.transfer_function_name.empty()) {

@@ -97,6 +97,8 @@ Json surfaces_json(const Isosurfaces& isosurfaces);
 Json light_json(const PointLight& light);
 /// Planes [a, b, c, d], as in experiment files.
 Json clip_planes_json(const std::vector<ClipPlane>& planes);
+/// [{"hash", "triangles", "color"}]: objects by what they hold, whatever their files are called.
+Json triangles_json(const std::vector<TriangleObject>& objects);
 
 /// The `render` part of a record, names of view and transfer function included.
 Json render_json(const RenderPoint& render);

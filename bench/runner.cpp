@@ -199,6 +199,7 @@ class Runner {
     Json record = blank_record(Status::ok);
     describe(record, build, render, &built);
     record["first_frame_ms"] = first_frame_ms;
+    if (!scene.settings.triangles.empty()) record["triangle_seconds"] = consumer->triangle_seconds();
     record["image_hash"] = picture_hash(picture);
     record["context"]["shader_hash"] = consumer->shader_hash();
     for (const std::string& text : scene_warnings(*mesh_, scene)) warn(record, text);
@@ -496,6 +497,7 @@ Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definit
   }
   if (scene.settings.mirror) key["mirror"] = mirror_name(*scene.settings.mirror);
   if (!scene.settings.clip_planes.empty()) key["clip_planes"] = clip_planes_json(scene.settings.clip_planes);
+  if (!scene.settings.triangles.empty()) key["triangles"] = triangles_json(scene.settings.triangles);
   if (scene.region)
     for (const Vec3d& corner : *scene.region) key["region"].push_back({corner.x, corner.y, corner.z});
   key["step"] = step;

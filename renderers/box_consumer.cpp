@@ -40,6 +40,8 @@ const Scene& require_drawable(const Scene& scene, const EncodedField& field) {
   if (s.mirror) refuse(s, "mirror is not available: boxes of the image are not drawn");
   if (!scene.more_fields.empty())
     refuse(s, fmt::format("transfer_functions of {} fields are not available: it draws one", 1 + scene.more_fields.size()));
+  if (!s.triangles.empty())
+    refuse(s, "triangles are not available: boxes are drawn whole, and rays end at triangles inside of them");
   if (s.early_end) refuse(s, "early_end is not available: a box's shader does not know what was drawn before it");
   if (s.slice_target == SliceTarget::rgba8 && !s.draws_slices()) refuse(s, "slice_target rgba8 belongs to slices");
   if (s.slice_target == SliceTarget::rgba8 && s.mode != Mode::dvr)

@@ -1,14 +1,20 @@
 #include "renderers/consumer.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "renderers/box_consumer.hpp"
 #include "renderers/raycaster.hpp"
+#include "structures/error.hpp"
 
 namespace amrtex {
 namespace {
 
 GlBuffer upload(Context& context, const HostTexture& host) {
+  if (host.bytes() > context.info().max_buffer_bytes)
+    throw UnsupportedError(fmt::format("{}: {} bytes; a storage buffer of this context holds at most {}", host.name, host.bytes(),
+                                       context.info().max_buffer_bytes));
   GlBuffer buffer = make_buffer(context);
   context.gl().NamedBufferStorage(buffer.id(), static_cast<GLsizeiptr>(host.data.size()), host.data.data(), 0);
   context.check("uploading " + host.name);

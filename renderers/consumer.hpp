@@ -38,6 +38,8 @@ class Consumer {
   virtual const std::string& shader_hash() const = 0;
   /// Is the transfer function evaluated from its points, and not from a table?
   virtual bool transfer_exact() const = 0;
+  /// That finding where rays meet the scene's triangles took, before the first draw; 0 where it has none.
+  virtual double triangle_seconds() const { return 0; }
 };
 
 /// The scene's consumer. Throws UnsupportedError naming consumer and reason where it cannot draw the scene or the field. The
@@ -57,6 +59,7 @@ class SceneResources {
   /// Storage buffers of field and scene.
   int buffer_count() const;
   bool transfer_exact() const { return bindings_.transfer_exact; }
+  double triangle_seconds() const { return bindings_.triangle_seconds; }
 
  private:
   const EncodedField* field_;

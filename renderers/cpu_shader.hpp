@@ -15,6 +15,8 @@ class CpuShader final : public CpuField {
  public:
   void set(const std::vector<std::pair<std::string, int>>& defines, const UniformValues& uniforms,
            const std::vector<const HostTexture*>& textures) override {
+    for (const auto& [name, member] : shader_.bindings.ints)
+      if (name.starts_with("AMRTEX_")) *member = 0;  // as no part of the text that the scene leaves out
     for (const auto& [name, value] : defines)
       if (auto it = shader_.bindings.ints.find(name); it != shader_.bindings.ints.end()) *it->second = value;
     for (const UniformValue& u : uniforms) set_uniform(u);
@@ -36,8 +38,15 @@ class CpuShader final : public CpuField {
   std::array<double, 4> trace(double x, double y) const override {
     typename Shader::Ray ray;
     typename Shader::Accumulation a = text().empty_accumulation();
-    const bool met = text().camera_ray(glm::vec<2, real>(x, y), ray);
-    const auto c = met ? text().march_ray(ray, a) : text().missed_picture();
+    const glm::vec<2, real> pixel(x, y);
+    bool met = false;
+    glm::vec<4, real> c;
+    if (text().AMRTEX_TRIANGLES != 0) {  // as raycast_triangles.frag, else as raycast.frag
+      c = text().march_to_triangle(pixel, a, met);
+    } else {
+      met = text().camera_ray(pixel, ray);
+      c = met ? text().march_ray(ray, a) : text().missed_picture();
+    }
     return {static_cast<double>(c.x), static_cast<double>(c.y), static_cast<double>(c.z), static_cast<double>(c.w)};
   }
 

@@ -19,6 +19,7 @@
 #include "renderers/reference_point.hpp"
 #include "renderers/reference_surface.hpp"
 #include "renderers/reference_tracer.hpp"
+#include "renderers/triangle_layer.hpp"
 
 namespace amrtex {
 namespace {
@@ -210,7 +211,9 @@ LightIntegral::Arriving arriving_light(Worker& worker, const IndexRay& ray) {
   return [&lamp = *worker.lamp, &ray](double t) { return lamp.light_at(ray.origin + t * ray.direction); };
 }
 
-void draw_pixel(Worker& worker, const Drawing& drawing, const std::vector<OtherField>& others, int x, int y, Picture& picture) {
+/// `most`: world length of the ray at which it ends at the latest.
+void draw_pixel(Worker& worker, const Drawing& drawing, const std::vector<OtherField>& others, int x, int y, double most,
+                Picture& picture) {
   const WorldRay world = camera_ray(drawing.camera, x, y, picture.width, picture.height);
   IndexRay ray{(world.origin - drawing.domain_lower) * drawing.cells_a_length, world.direction * drawing.cells_a_length};
   Vec3d lower = drawing.lower;
@@ -222,7 +225,7 @@ void draw_pixel(Worker& worker, const Drawing& drawing, const std::vector<OtherF
     (drawing.mirror->upper ? upper : lower)[axis] += (drawing.mirror->upper ? 1 : -1) * (upper[axis] - lower[axis]);
   }
   auto span = stretch_in(ray, lower, upper);
-  if (span) span = cut(ray, drawing.planes, *span);
+  if (span) span = cut(ray, drawing.planes, {span->from, std::min(span->to, most)});
   if (!span || !(span->to > span->from)) return;
   ray.origin += span->from * ray.direction;  // from here on no digits are spent on the way to the mesh
   const std::vector<RayPart> parts = parts_of(ray, world.direction, span->to - span->from, drawing.mirror, face);
@@ -247,6 +250,14 @@ void draw_pixel(Worker& worker, const Drawing& drawing, const std::vector<OtherF
   }
 }
 
+/// What is left of a triangle's light behind the volume; pictures of one channel have no place for it.
+void draw_triangle(const RenderSettings& s, const TriangleLayer::Pixel& first, double* pixel) {
+  if (first.object < 0 || s.picture_channels() == 1) return;
+  const Vec3d rgb = s.triangles[static_cast<std::size_t>(first.object)].color * first.light;
+  for (int c = 0; c < 3; ++c) pixel[c] += (1 - pixel[3]) * rgb[c];
+  pixel[3] = 1;
+}
+
 void check(const Scene& scene, double step) {
   if (!(step > 0)) throw Error(fmt::format("reference step {}: must be a positive number of cell widths", step));
   if (scene.settings.width < 1 || scene.settings.height < 1)
@@ -257,6 +268,7 @@ void check(const Scene& scene, double step) {
   validate_clip_planes(scene.settings.clip_planes);
   validate_mirror(scene.settings);
   validate_fields(scene);
+  validate_triangles(scene.settings);
 }
 
 double extinction_scale(const AmrHierarchy& h, const TransferFunction& tf) {
@@ -342,6 +354,8 @@ Picture HierarchyReference::draw(const Scene& scene, double step, const Analytic
   std::vector<OtherField> others;
   for (const FieldTransfer& f : scene.more_fields)
     others.push_back({data_->other_field(f.field), TransferTable(f.transfer_function, extinction_scale(h, f.transfer_function))});
+  std::optional<TriangleLayer> triangles;
+  if (!scene.settings.triangles.empty()) triangles = trace_triangles(scene);
   Picture picture(scene.settings.width, scene.settings.height, scene.settings.picture_channels());
   const int columns = ceil_div(picture.width, kTile);
   tbb::enumerable_thread_specific<Worker> workers([&] {
@@ -356,7 +370,11 @@ Picture HierarchyReference::draw(const Scene& scene, double step, const Analytic
     const int x0 = tile % columns * kTile;
     const int y0 = tile / columns * kTile;
     for (int y = y0; y < std::min(y0 + kTile, picture.height); ++y)
-      for (int x = x0; x < std::min(x0 + kTile, picture.width); ++x) draw_pixel(worker, drawing, others, x, y, picture);
+      for (int x = x0; x < std::min(x0 + kTile, picture.width); ++x) {
+        const TriangleLayer::Pixel first = triangles ? triangles->at(x, y) : TriangleLayer::Pixel{};
+        draw_pixel(worker, drawing, others, x, y, first.distance, picture);
+        draw_triangle(scene.settings, first, picture.pixel(x, y));
+      }
   });
   return picture;
 }

@@ -19,7 +19,8 @@ Raycaster::Raycaster(Context& context, const AmrHierarchy& hierarchy, const Enco
 Program Raycaster::make_program(bool counting) const {
   ShaderKey vertex;
   vertex.entry = "fullscreen.vert";
-  return {*context_, assemble_shader(vertex), assemble_shader(resources_.shader_key("raycast.frag", counting))};
+  const char* entry = scene_.settings.triangles.empty() ? "raycast.frag" : "raycast_triangles.frag";
+  return {*context_, assemble_shader(vertex), assemble_shader(resources_.shader_key(entry, counting))};
 }
 
 FrameTime Raycaster::draw() {

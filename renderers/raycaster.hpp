@@ -20,6 +20,7 @@ class Raycaster final : public Consumer {
   const std::string& shader_hash() const override { return program_.hash(); }
   const Program& program() const { return program_; }
   bool transfer_exact() const override { return resources_.transfer_exact(); }
+  double triangle_seconds() const override { return resources_.triangle_seconds(); }
 
  private:
   Program make_program(bool counting) const;

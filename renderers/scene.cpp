@@ -427,6 +427,20 @@ void validate_fields(const Scene& scene) {
   }
 }
 
+void validate_triangles(const RenderSettings& s) {
+  if (s.triangles.empty()) return;
+  if (s.triangles.size() > kMostTriangleObjects)
+    throw UsageError(
+        fmt::format("'triangles' has {} objects; at most {} are supported", s.triangles.size(), kMostTriangleObjects));
+  for (std::size_t i = 0; i < s.triangles.size(); ++i)
+    for (int c = 0; c < 3; ++c)
+      if (const double v = s.triangles[i].color[c]; !(v >= 0 && v <= 1))
+        throw UsageError(fmt::format("'triangles' object {}: the colour {} must lie in [0, 1]", i, v));
+  if (s.draws_surfaces() && s.isosurfaces.output != Output::color)
+    throw UsageError(fmt::format("'triangles' are no isosurface: with them the output color is accepted, not {}",
+                                 output_name(s.isosurfaces.output)));
+}
+
 ClipPlane in_finest_cells(const AmrHierarchy& h, const ClipPlane& plane) {
   const auto largest = [](const Vec3d& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); };
   const double size = largest(plane.normal);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -156,6 +157,17 @@ struct Mirror {
 std::string mirror_name(const Mirror& mirror);
 Mirror parse_mirror(std::string_view name);
 
+class TriangleMesh;
+
+/// Triangles that end the rays which meet them; in pictures of colours they are seen behind what lies in front of them, lit from
+/// the eye on both sides (surface_light).
+struct TriangleObject {
+  std::shared_ptr<const TriangleMesh> mesh;  ///< world; never null
+  Vec3d color{0.8};                          ///< linear, in [0, 1]
+  std::string file;                          ///< as the scene names it; empty where there is none
+};
+inline constexpr std::size_t kMostTriangleObjects = 16;
+
 struct RenderSettings {
   ConsumerKind consumer = ConsumerKind::raycast;
   SliceTarget slice_target = SliceTarget::rgba32f;  ///< consumers `slices` and `stencil_slices`
@@ -176,6 +188,8 @@ struct RenderSettings {
   /// Seed of a random offset for each ray, by which its intervals are moved (Wald et al. 2020, section 4.2); off when absent.
   std::optional<std::uint32_t> ray_offset;
   std::optional<Mirror> mirror;  ///< absent: the field alone
+  /// At most kMostTriangleObjects; neither cut nor mirrored, and no part of what lights or shadows anything.
+  std::vector<TriangleObject> triangles;
   /// Refined cells are drawn themselves where they are smaller on the picture, pixels; off when absent.
   std::optional<double> level_of_detail;
   std::optional<int> max_level;  ///< nothing finer is drawn where a cell of this level or a coarser one lies; off when absent
@@ -198,6 +212,8 @@ void validate_clip_planes(const std::vector<ClipPlane>& planes);
 void validate_ray_offset(const RenderSettings& settings);
 /// Throws UsageError where a mirror does not go with a lamp or level of detail.
 void validate_mirror(const RenderSettings& settings);
+/// Throws UsageError: too many objects, a colour that is none, or pictures of depth and normals.
+void validate_triangles(const RenderSettings& settings);
 /// Throws UsageError where the integrator does not go with the mode, the sampling or the tolerance.
 void validate_integrator(const RenderSettings& settings);
 

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
+#include "renderers/triangle_layer.hpp"
 #include "structures/build_tools.hpp"
 
 namespace amrtex {
@@ -269,6 +271,20 @@ void add_occlusion(const AmrHierarchy& h, const RenderSettings& s, SceneBindings
   b.uniforms.push_back({"u_occlusion_seed", std::vector<int>{static_cast<int>(around->seed)}});
 }
 
+/// Nothing of it in a scene without triangles, not even a define: they have an entry point of their own.
+void add_triangles(const AmrHierarchy& h, const Scene& scene, SceneBindings& b) {
+  validate_triangles(scene.settings);
+  const std::vector<TriangleObject>& objects = scene.settings.triangles;
+  if (objects.empty()) return;
+  const auto start = std::chrono::steady_clock::now();
+  b.buffers.push_back(triangle_buffer(trace_triangles(scene), smallest_edge(h)));
+  b.triangle_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  std::vector<double> colors;
+  for (const TriangleObject& object : objects) colors.insert(colors.end(), {object.color.r, object.color.g, object.color.b});
+  b.defines.emplace_back("AMRTEX_TRIANGLES", static_cast<int>(objects.size()));
+  b.uniforms.push_back({"u_triangle_colors", colors});
+}
+
 void require_detail(const EncodedField& field, const RenderSettings& s) {
   const auto& defines = field.shader.defines;
   const auto it = std::find(defines.begin(), defines.end(), std::pair<std::string, int>("AMRTEX_LEVEL_OF_DETAIL", 1));
@@ -492,6 +508,7 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
   b.defines.emplace_back("AMRTEX_MIRROR", s.mirror ? 2 * s.mirror->axis + (s.mirror->upper ? 2 : 1) : 0);
   add_light(h, s, b);
   add_fields(h, field, scene, b);
+  add_triangles(h, scene, b);
   if (s.draws_surfaces()) add_surfaces(scene, field, b);
   add_integrator(scene, field, extinction_unit(h, scene.transfer_function), b);
   return b;

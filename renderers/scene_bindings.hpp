@@ -14,8 +14,9 @@ namespace amrtex {
 struct SceneBindings {
   std::vector<std::pair<std::string, int>> defines;
   UniformValues uniforms;
-  std::vector<HostTexture> buffers;  ///< the transfer function's tables, where it has too many points
+  std::vector<HostTexture> buffers;  ///< the transfer function's tables, where it has too many points; triangles
   bool transfer_exact = true;        ///< evaluated from its points; else from a table of 4096 bins
+  double triangle_seconds = 0;       ///< that finding where rays meet triangles took
 };
 
 /// A view in the mesh's own coordinates, and what of the mesh is drawn. A point p lies at (p - eye) / cells_per_unit from the

@@ -331,14 +331,12 @@ void draw_surface(IN(Ray) ray, INOUT(Accumulation) a) {
   if (AMRTEX_DRAWS_VOLUME) shift_volume(a, value, -shift, lit.y);
 }
 
-#if AMRTEX_CPP || AMRTEX_MIRROR
-// A sample on the mirror, of no length: a surface between the last sample before it and the first behind it is not lost.
-void note_mirror(IN(Ray) ray, INOUT(Accumulation) a) {
+// A sample at the ray's end, of no length: a surface between the last sample and a mirror (or a triangle) there is not lost.
+void note_end(IN(Ray) ray, INOUT(Accumulation) a) {
   FieldSample s;
   bool has_value = sample_field(make_position(ray.entry + ray.direction * ray.length), s);
   note_side(a, !has_value, s.value, ray.length, ray.length);
 }
-#endif
 
 // An opaque surface ends a ray; pictures of depth and normals end at the first.
 bool surfaces_ended(IN(Accumulation) a) {

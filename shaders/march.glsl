@@ -666,7 +666,7 @@ void march_surfaces(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front, IN(b
 #if AMRTEX_CPP || AMRTEX_MIRROR
     if (AMRTEX_MIRROR != 0 && goes_on && !a.crossing && !ray_ended(a)) {
       at_mirror = true;
-      note_mirror(ray, a);
+      note_end(ray, a);
     }
 #endif
     more = a.crossing;

@@ -11,6 +11,7 @@
 #include "bench/json_file.hpp"
 #include "bench/record.hpp"
 #include "bench/runner.hpp"
+#include "renderers/triangle_mesh.hpp"
 #include "structures/error.hpp"
 
 namespace amrtex {
@@ -415,6 +416,10 @@ TEST(ExperimentErrors, NameKeyAndWhatIsAccepted) {
       {"render", R"({"mirror": "x"})", "render.mirror:", "-x, +x"},
       {"render", R"({"mirror": "+x", "level_of_detail": 2})", "render.mirror:", "one of both"},
       {"render", R"({"mirror": "+x", "point_light": [0, 0, 0]})", "render.mirror:", "one of both"},
+      {"render", R"({"triangles": "ball.obj"})", "render.triangles:", "an object"},
+      {"render", R"({"triangles": {"color": [1, 1, 1]}})", "render.triangles", "'file' is missing"},
+      {"render", R"({"triangles": {"file": "ball.obj", "colour": [1, 1, 1]}})", "render.triangles.colour:", "color"},
+      {"render", R"({"triangles": [{"file": "folder/absent.obj"}]})", "render.triangles[0].file:", "no such file"},
       {"render", R"({"ray_offset": 3})", "render.ray_offset:", "true"},
       {"render", R"({"ray_offset": true, "integrator": "left"})", "render.ray_offset:", "exponential_midpoint and euler"},
       {"render", R"({"clip_planes": [[1, 0, 0]]})", "render.clip_planes[0]:", "[a, b, c, d]"},
@@ -449,6 +454,79 @@ TEST(ExperimentErrors, NameKeyAndWhatIsAccepted) {
     EXPECT_THAT(complaint(with(mistake.key, mistake.value)),
                 AllOf(testing::ContainsRegex("^folder/e.json:[0-9]+: "), HasSubstr(mistake.place), HasSubstr(mistake.accepted)))
         << mistake.key << ": " << mistake.value;
+}
+
+/// A folder with a triangle in it.
+class TrianglesOfExperiments : public testing::Test {
+ protected:
+  TrianglesOfExperiments() : folder_(fs::temp_directory_path() / fmt::format("amrtex_experiment_triangles_{}", ::getpid())) {
+    fs::create_directories(folder_);
+    for (const char* name : {"a.obj", "copy.obj"}) std::ofstream(folder_ / name) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    std::ofstream(folder_ / "broken.obj") << "v 0 0 0\nf 1 2 3\n";
+  }
+  ~TrianglesOfExperiments() override { fs::remove_all(folder_); }
+
+  Experiment parsed(const std::string& render) const { return parse_experiment(with("render", render), folder_ / "e.json"); }
+  std::string hash(const RenderPoint& render) const {
+    return configuration_hash(point_configuration(Experiment{}, BuildPoint{}, render, ""));
+  }
+  fs::path folder_;
+};
+
+TEST_F(TrianglesOfExperiments, AreOneValueOrAListOfThemAndListsOfListsAreAnAxis) {
+  const Experiment one = parsed(R"({"triangles": {"file": "a.obj"}})");
+  ASSERT_EQ(one.renders.size(), 1U);
+  ASSERT_EQ(one.renders[0].settings.triangles.size(), 1U);
+  EXPECT_EQ(one.renders[0].settings.triangles[0].mesh->triangles().size(), 1U);
+  EXPECT_EQ(one.renders[0].settings.triangles[0].color, Vec3d(0.8));
+
+  const Experiment axis =
+      parsed(R"({"triangles": [[], [{"file": "a.obj", "color": [1, 0.5, 0]}, {"file": "a.obj"}]], "step": [1, 2]})");
+  ASSERT_EQ(axis.renders.size(), 4U);
+  EXPECT_FALSE(render_json(axis.renders[0]).contains("triangles")) << "as in records of scenes that know of none";
+  const Json json = render_json(axis.renders[2])["triangles"];
+  EXPECT_EQ(json[0]["file"], "a.obj");
+  EXPECT_EQ(json[0]["color"], Json({1.0, 0.5, 0.0}));
+  EXPECT_EQ(json[0]["triangles"], 1);
+  const auto& objects = axis.renders[2].settings.triangles;
+  EXPECT_EQ(objects[0].mesh, objects[1].mesh) << "read once";
+  EXPECT_TRUE(parsed(R"({"triangles": null})").renders[0].settings.triangles.empty());
+}
+
+TEST_F(TrianglesOfExperiments, NameAMeasurementByWhatTheyHold) {
+  const RenderPoint a = parsed(R"({"triangles": {"file": "a.obj"}})").renders[0];
+  const RenderPoint copy = parsed(R"({"triangles": {"file": "copy.obj"}})").renders[0];
+  const RenderPoint red = parsed(R"({"triangles": {"file": "a.obj", "color": [1, 0, 0]}})").renders[0];
+  const RenderPoint none = parsed("{}").renders[0];
+  EXPECT_EQ(hash(a), hash(copy));
+  EXPECT_NE(hash(a), hash(red));
+  EXPECT_NE(hash(a), hash(none));
+}
+
+TEST_F(TrianglesOfExperiments, AreRefusedWithFileLineAndKey) {
+  const struct {
+    const char* render;
+    const char* place;
+    const char* accepted;
+  } mistakes[] = {
+      {R"({"triangles": {"file": "broken.obj"}})", "render.triangles.file:", "accepted: OBJ, PLY or STL"},
+      {R"({"triangles": {"file": "e.json"}})", "render.triangles.file:", "no such file"},
+      {R"({"triangles": {"file": "a.obj", "color": [1, 0]}})", "render.triangles.color:", "[r, g, b]"},
+      {R"({"triangles": {"file": "a.obj", "color": 1}})", "render.triangles.color:", "[r, g, b]"},
+      {R"({"triangles": {"file": "a.obj", "color": [1, 0, 2]}})", "render.triangles.color[2]:", "from 0 to 1"},
+      {R"({"mode": "iso", "isovalues": [1], "output": "normal", "triangles": {"file": "a.obj"}})",
+       "render.triangles:", "output color"},
+  };
+  for (const auto& mistake : mistakes) {
+    std::string complaint = "accepted";
+    try {
+      parsed(mistake.render);
+    } catch (const UsageError& e) {
+      complaint = e.what();
+    }
+    EXPECT_THAT(complaint,
+                AllOf(testing::ContainsRegex("e.json:[0-9]+: "), HasSubstr(mistake.place), HasSubstr(mistake.accepted)));
+  }
 }
 
 TEST(ExperimentErrors, NameMissingKeys) {
