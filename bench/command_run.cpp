@@ -8,6 +8,7 @@
 #include "bench/record.hpp"
 #include "bench/report.hpp"
 #include "bench/runner.hpp"
+#include "bench/scatter.hpp"
 #include "bench/work_precision.hpp"
 
 namespace amrtex {
@@ -59,10 +60,13 @@ std::vector<Table> write_report(const fs::path& folder, const std::string& colum
   if (!fs::exists(file)) return tables;
   const std::vector<Json> records = load_records(folder);
   for (Table& table : make_paper_tables(file, records)) tables.push_back(std::move(table));
-  const WorkPrecision work_precision = make_work_precision(file, records);
-  tables.insert(tables.end(), work_precision.tables.begin(), work_precision.tables.end());
-  for (const Diagram& diagram : work_precision.diagrams)
-    write_text(folder / (diagram.name + ".vl.json"), diagram.specification.dump(1) + "\n");
+  const auto add = [&](const auto& made) {
+    tables.insert(tables.end(), made.tables.begin(), made.tables.end());
+    for (const Diagram& diagram : made.diagrams)
+      write_text(folder / (diagram.name + ".vl.json"), diagram.specification.dump(1) + "\n");
+  };
+  add(make_work_precision(file, records));
+  add(make_scatter(file, records));
   write_tables(folder, tables);
   return tables;
 }
@@ -81,6 +85,7 @@ int run(const Arguments& a) {
   if (fs::exists(paper_tables)) {  // an error ends here, before any work
     make_paper_tables(paper_tables, {});
     make_work_precision(paper_tables, {});
+    make_scatter(paper_tables, {});
   }
   RunOptions options;
   options.folder = a.output;

@@ -12,6 +12,7 @@
 #include <set>
 
 #include "bench/json_file.hpp"
+#include "bench/orbit.hpp"
 #include "renderers/triangle_reader.hpp"
 #include "structures/analytic_fields.hpp"
 #include "structures/error.hpp"
@@ -134,10 +135,11 @@ class Parser {
 
  private:
   void accept_root_keys() const {
-    Names keys = {"name",      "datasets", "encodings",     "filters",           "storage",
-                  "filtering", "render",   "views",         "transfer_function", "frames",
-                  "warm_up",   "seed",     "reference",     "context",           "memory_limit",
-                  "check",     "baseline", "explain_error", "explain_left_out",  "transfer_functions"};
+    Names keys = {"name",       "datasets", "encodings",     "filters",           "storage",
+                  "filtering",  "render",   "views",         "transfer_function", "frames",
+                  "warm_up",    "seed",     "reference",     "context",           "memory_limit",
+                  "check",      "baseline", "explain_error", "explain_left_out",  "transfer_functions",
+                  "time_change"};
     if (scene_) keys.push_back("region");
     root_.accept_keys(keys);
   }
@@ -603,11 +605,15 @@ class Parser {
     const std::vector<JsonNode> nodes = values("views");
     for (std::size_t i = 0; i < nodes.size(); ++i)
       for_each_named(nodes[i], fmt::format("view {}", i + 1), [&](const Json& json, const std::string& name) {
-        RenderPoint point;
-        point.view = parse_view(json);
-        camera_frame(point.view, 1, 1);  // throws where the view is degenerate
-        point.view_name = name;
-        points.push_back(point);
+        const auto views = orbit_views(json, name);
+        if (views.size() > 1) experiment_.axes.push_back(nodes[i].place() + ".orbit");
+        for (const auto& [view, view_name] : views) {
+          RenderPoint point;
+          point.view = parse_view(view);
+          camera_frame(point.view, 1, 1);  // throws where the view is degenerate
+          point.view_name = view_name;
+          points.push_back(point);
+        }
       });
     return points;
   }
@@ -704,7 +710,9 @@ class Parser {
       experiment_.reference.reset();
       return;
     }
-    node->accept_keys(Names{"step", "filter", "own"});
+    node->accept_keys(Names{"step", "filter", "own", "shading"});
+    if (const auto shading = node->find("shading"); shading && !shading->json().is_null())
+      experiment_.reference->shading = located(*shading, [&] { return parse_shading(shading->text()); });
     if (const auto step = node->find("step")) experiment_.reference->step = step->positive_number();
     if (const auto filter = node->find("filter")) experiment_.reference->common_filter = parse_common_filter(*filter);
     if (const auto own = node->find("own")) {
@@ -745,7 +753,11 @@ class Parser {
         explain->fail(
             "what is explained is the error against the own reference; accepted: false where 'reference' has 'own' false");
     }
+    if (experiment_.explain_error && experiment_.reference->shading)
+      root_.find("explain_error")
+          ->fail("the causes are those of the picture's own shading; accepted: 'reference' without 'shading'");
     if (const auto explain = root_.find("explain_left_out")) experiment_.explain_left_out = explain->boolean();
+    if (const auto change = root_.find("time_change")) experiment_.time_change = change->boolean();
     if (const auto region = root_.find("region")) parse_region(*region);
   }
 
@@ -899,6 +911,7 @@ Json point_configuration(const Experiment& experiment, const BuildPoint& build, 
     reference = {{"step", experiment.reference->step}, {"filter", common ? filter_name(*common) : "own"}};
     if (experiment.explain_error) reference["explain"] = true;  // absent elsewhere: older records keep their names
     if (!experiment.reference->own) reference["own"] = false;   // likewise
+    if (experiment.reference->shading) reference["shading"] = shading_name(*experiment.reference->shading);
   }
   Json configuration = {{"experiment", experiment.name},
                         {"dataset", dataset_hash},
@@ -918,6 +931,7 @@ Json point_configuration(const Experiment& experiment, const BuildPoint& build, 
                         {"memory_limit", experiment.memory_limit ? Json(*experiment.memory_limit) : Json()},
                         {"minimum_psnr_db", json_or_null(experiment.minimum_psnr_db)}};
   if (experiment.explain_left_out) configuration["explain_left_out"] = true;
+  if (experiment.time_change) configuration["time_change"] = true;
   return configuration;
 }
 

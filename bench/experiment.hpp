@@ -52,7 +52,8 @@ struct ReferenceSettings {
   /// Filter of `error_common`; absent ("own" in the file) leaves that out. `linear_page`
   /// stands for one page of the finest level, the dense field.
   std::optional<Filter> common_filter = Filter::linear_vertex;
-  bool own = true;  ///< false: no `error`, which takes a reference of its own for each filter and page size
+  bool own = true;                   ///< false: no `error`, which takes a reference of its own for each filter and page size
+  std::optional<Shading> shading{};  ///< normals that isosurfaces are judged by; absent: those of the picture's own `shading`
 };
 
 struct Experiment {
@@ -72,6 +73,7 @@ struct Experiment {
   bool baseline = false;
   bool explain_error = false;     ///< records hold the error by cause, for several more pictures a point (bench/error_split.hpp)
   bool explain_left_out = false;  ///< records hold what each part left out would have cost to build (bench/left_out_time.hpp)
+  bool time_change = false;       ///< records hold the time of a change of transfer function or isovalues (bench/change_time.hpp)
   std::vector<std::string> axes;  ///< places in the file whose list has more than one value
 
   std::size_t points() const { return builds.size() * renders.size(); }

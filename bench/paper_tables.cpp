@@ -13,14 +13,12 @@
 
 #include "bench/json_file.hpp"
 #include "bench/record.hpp"
+#include "bench/record_conditions.hpp"
 
 namespace amrtex {
 namespace {
 
 using Records = std::vector<const Json*>;
-/// JSON pointer -> the value that a record has there, or a list of such values. Not ordered_json, which tells
-/// objects apart by the order of their keys.
-using Conditions = std::map<std::string, nlohmann::json>;
 
 /// What is read from the records, up to the row's scale.
 struct Quantity {
@@ -47,39 +45,16 @@ struct Entry {
 
 // --- the file ---
 
-/// A misspelt pointer matches nothing, silently; so its first key must be one that records have.
-void check_pointer(const JsonNode& node, const std::string& text) {
-  std::vector<std::string> keys = {"/statistics", "/storage_scale"};
-  const Json blank = blank_record(Status::ok);
-  for (const auto& [key, value] : blank.items()) keys.push_back("/" + key);
-  const std::string first = text.substr(0, text.find('/', 1));
-  const bool escapes = text.find('~') != std::string::npos;  // no key of a record needs them
-  if (!escapes && std::find(keys.begin(), keys.end(), first) != keys.end()) return;
-  const std::vector<std::string_view> names(keys.begin(), keys.end());
-  node.fail(fmt::format("'{}' is no place in a record; accepted: a JSON pointer as /render/mode that begins with one of {}{}",
-                        text, fmt::join(names, ", "), suggestion(first, names)));
-}
-
-Conditions read_where(const JsonNode& node, Conditions where) {
-  if (const auto given = node.find("where"))
-    for (const auto& [pointer, value] : given->members()) {
-      check_pointer(value, pointer);
-      value.items();  // refuses the empty list
-      where.insert_or_assign(pointer, value.json());
-    }
-  return where;
-}
-
 /// Without a `value` of its own it is the quantity `like`, of other records.
 Quantity read_quantity(const JsonNode& node, const std::string& label, const Conditions& where, const Quantity* like) {
-  Quantity quantity{node, label, read_where(node, where), {}, false};
+  Quantity quantity{node, label, read_conditions(node, where), {}, false};
   if (like != nullptr && !node.find("value")) {
     quantity.pointers = like->pointers;
     quantity.inverse = like->inverse;
   } else {
     for (const JsonNode& pointer : node.require("value").items()) {
       quantity.pointers.push_back(pointer.text());
-      check_pointer(pointer, quantity.pointers.back());
+      check_record_pointer(pointer, quantity.pointers.back());
     }
   }
   if (const auto inverse = node.find("inverse")) quantity.inverse = inverse->boolean();
@@ -131,7 +106,7 @@ Entry read_entry(const JsonNode& node) {
       name.fail(fmt::format("the data set '{}' is given twice", name.text()));
     entry.datasets.push_back(name.text());
   }
-  const Conditions where = read_where(node, {});
+  const Conditions where = read_conditions(node, {});
   for (const JsonNode& row : node.require("rows").items()) entry.rows.push_back(read_row(row, entry.datasets.size(), where));
   return entry;
 }
@@ -139,14 +114,6 @@ Entry read_entry(const JsonNode& node) {
 // --- what the records say ---
 
 Json at(const Json& json, const std::string& pointer) { return value_at(json, pointer); }
-
-bool accepts(const nlohmann::json& accepted, const nlohmann::json& value) {
-  return accepted == value || (accepted.is_array() && std::find(accepted.begin(), accepted.end(), value) != accepted.end());
-}
-
-bool matches(const Json& record, const Conditions& where) {
-  return std::all_of(where.begin(), where.end(), [&](const auto& c) { return accepts(c.second, at(record, c.first)); });
-}
 
 struct Amount {
   double value;
@@ -280,8 +247,8 @@ std::vector<Table> make_paper_tables(const std::filesystem::path& path, std::spa
   const JsonFile file = JsonFile::read(path);
   std::vector<Entry> entries;
   for (const JsonNode& node : file.root().items())
-    if (!node.find("work_precision")) entries.push_back(read_entry(node));  // those are of bench/work_precision.cpp
-  std::map<std::string, Records> by_renderer;                               // their times do not belong side by side
+    if (!node.find("work_precision") && !node.find("scatter")) entries.push_back(read_entry(node));  // those make diagrams
+  std::map<std::string, Records> by_renderer;  // their times do not belong side by side
   for (const Json& record : records) {
     const Json renderer = at(record, "/context/renderer");
     by_renderer[renderer.is_null() ? "none" : renderer.get<std::string>()].push_back(&record);

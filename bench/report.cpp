@@ -112,6 +112,11 @@ Cell status_cell(const Json& record, const Group&) {
   return reason.empty() ? status : fmt::format("{}: {}", status, reason);
 }
 
+/// Said only where it is on.
+Cell ray_offset_cell(const Json& record, const Group&) {
+  return at(record, "/render/ray_offset") == true ? Cell("on") : Cell(std::monostate());
+}
+
 /// What was left out for want of need, and because it is hidden.
 Cell left_out_cell(const Json& record, const Group&) {
   const Json& list = at(record, "/left_out");
@@ -180,6 +185,9 @@ constexpr ColumnRule kColumns[] = {
     {"skip", "skip", "", Role::setting, false, value<"/render/skip">},
     {"level_of_detail", "level of detail", "pixels", Role::setting, true, value<"/render/level_of_detail">},
     {"max_level", "max level", "", Role::setting, true, value<"/render/max_level">},
+    {"shading", "shading", "", Role::setting, false, value<"/render/shading">},
+    {"output", "output", "", Role::setting, false, value<"/render/output">},
+    {"ray_offset", "offset of rays", "", Role::setting, false, ray_offset_cell},
     {"point_light", "lamp", "", Role::setting, false, value<"/render/point_light">},
     {"needs", "needs", "", Role::setting, false, value<"/render/needs">},
     {"prune", "prune", "", Role::setting, false, value<"/render/prune">},
@@ -200,6 +208,7 @@ constexpr ColumnRule kColumns[] = {
     {"wall", "frame wall (ms)", "", Role::measure, true, timing<"/frame/wall_ms">},
     {"gpu", "frame GPU (ms)", "", Role::measure, true, timing<"/frame/gpu_ms">},
     {"relative", "time / uniform", "", Role::measure, true, relative_cell},
+    {"change", "change of transfer function (ms)", "", Role::measure, true, timing<"/change/wall_ms">},
     {"baseline", "time / baseline", "", Role::measure, true, value<"/frame/relative">},
     {"pages", "pages", "", Role::measure, true, value<"/statistics/pages">},
     {"border_overhead", "border overhead", "", Role::measure, true, value<"/statistics/border_overhead">},
@@ -238,7 +247,7 @@ bool is_split(const ColumnRule& rule) { return std::string_view(rule.key).starts
 bool is_default(const ColumnRule& rule) {
   if (is_split(rule)) return false;
   constexpr auto on_demand = std::to_array<std::string_view>(
-      {"left_out", "left_out_seconds", "p95_error", "within_tolerance", "baseline", "upload", "rays", "regions_skipped",
+      {"change", "left_out", "left_out_seconds", "p95_error", "within_tolerance", "baseline", "upload", "rays", "regions_skipped",
        "max_error", "mrse", "rmse_common", "p95_common", "pages", "border_overhead", "border_formula", "oversampling", "passes"});
   return std::find(on_demand.begin(), on_demand.end(), rule.key) == on_demand.end();
 }

@@ -7,6 +7,7 @@
 #include <memory>
 #include <random>
 
+#include "bench/change_time.hpp"
 #include "bench/environment.hpp"
 #include "bench/error_split.hpp"
 #include "bench/image_error.hpp"
@@ -26,6 +27,7 @@ namespace fs = std::filesystem;
 constexpr double kBaselineDrift = 0.15;
 constexpr int kBaselineFrames = 3;
 constexpr int kTimingTries = 4;
+constexpr int kChanges = 20;
 
 class Stopwatch {
  public:
@@ -219,7 +221,18 @@ class Runner {
                       {"regions_skipped", work.regions_skipped},
                       {"passes", work.passes}};
     if (render.frames > 0) add_times(record, build, render, *consumer);
+    if (experiment_.time_change) add_change(record, built, scene);
     write(build, render, record);
+  }
+
+  void add_change(Json& record, const Built& built, const Scene& scene) {
+    try {
+      const ChangeTimes change = time_changes(*context_, *mesh_, built.field, *built.gpu, scene, kChanges);
+      record["change"] = {{"wall_ms", timing_json(change.wall_ms)}, {"bytes", change.bytes}};
+    } catch (const UnsupportedError& error) {
+      record["change"] = nullptr;
+      warn(record, error.what());
+    }
   }
 
   static void warn(Json& record, const std::string& text) { record["context"]["warnings"].push_back(text); }
@@ -228,19 +241,21 @@ class Runner {
   bool add_errors(Json& record, const Picture& picture, const Built& built, const Scene& scene) {
     if (!experiment_.reference) return true;
     const ReferenceSettings& reference = *experiment_.reference;
+    Scene judge = scene;
+    if (reference.shading) judge.settings.isosurfaces.shading = *reference.shading;
     const fs::path cache = options_.folder / "references";
     std::string hash;
     if (reference.common_filter) {
       FilterDefinition common{*reference.common_filter, 0, mesh_->finest_level()};
       if (common.filter != Filter::linear_page) common.page_level = 0;
-      const Picture shared = cached_reference(*mesh_, common, scene, reference.step, cache, hash);
+      const Picture shared = cached_reference(*mesh_, common, judge, reference.step, cache, hash);
       record["error_common"] = error_json(compare(picture, shared), hash);
       record["error_common"]["p95"] = percentile(pixel_errors(picture, shared), 0.95);
       record["error_common"]["p95_seen"] = percentile(seen_errors(picture, shared), 0.95);
       record["error_common"]["filter"] = filter_name(common.filter);
     }
     if (!reference.own) return true;
-    const Picture own = cached_reference(*mesh_, built.field.definition, scene, reference.step, cache, hash);
+    const Picture own = cached_reference(*mesh_, built.field.definition, judge, reference.step, cache, hash);
     const ErrorMetrics error = compare(picture, own);
     record["error"] = error_json(error, hash);
     record["error"]["split"] = experiment_.explain_error ? explain(built, scene, own, picture) : Json();

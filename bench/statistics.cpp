@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "structures/error.hpp"
 
@@ -67,6 +68,27 @@ Summary summarize(std::span<const double> samples) {
   s.ci_upper = sorted[s.n - 1 - ranks.outside];
   s.coverage = ranks.coverage;
   return s;
+}
+
+std::optional<LinearFit> fit_line(std::span<const double> x, std::span<const double> y) {
+  if (x.size() != y.size()) throw Error(fmt::format("statistics: {} values of x and {} of y", x.size(), y.size()));
+  for (std::size_t i = 0; i < x.size(); ++i)
+    if (!std::isfinite(x[i]) || !std::isfinite(y[i])) throw Error(fmt::format("statistics: point {} is not finite", i));
+  if (x.size() < 3) return std::nullopt;
+  const auto mean = [](std::span<const double> values) {
+    return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+  };
+  const double mean_x = mean(x), mean_y = mean(y);
+  double xx = 0, xy = 0, yy = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double dx = x[i] - mean_x, dy = y[i] - mean_y;
+    xx += dx * dx;
+    xy += dx * dy;
+    yy += dy * dy;
+  }
+  if (!(xx > 0) || !(yy > 0)) return std::nullopt;
+  const double slope = xy / xx;
+  return LinearFit{slope, mean_y - slope * mean_x, std::clamp(xy / std::sqrt(xx * yy), -1.0, 1.0)};
 }
 
 }  // namespace amrtex

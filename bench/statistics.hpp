@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,5 +27,16 @@ double median(std::span<const double> samples);
 /// numbers. Fewer than 6 samples cannot give 95 %; then it is [min, max]. Throws Error
 /// when there are no samples or one is not finite.
 Summary summarize(std::span<const double> samples);
+
+/// The line through points with the least squares of what y is off, and Pearson's correlation coefficient of x and y.
+struct LinearFit {
+  double slope = 0;  ///< y per x
+  double at_zero = 0;
+  double correlation = 0;  ///< -1 to 1
+};
+
+/// Nothing where a line means nothing: fewer than three points, or all of one x or one y. Throws Error where the lists
+/// differ in length or a number is not finite.
+std::optional<LinearFit> fit_line(std::span<const double> x, std::span<const double> y);
 
 }  // namespace amrtex

@@ -368,31 +368,11 @@ Json diagram(const Scene& scene, const Question& question) {
                       {{"x", {{"value", 0}}},
                        {"y", {{"field", "line"}, {"type", "ordinal"}, {"axis", nullptr}}},
                        {"text", {{"field", "text"}, {"type", "nominal"}}}}}};
-  return {{"$schema", "https://vega.github.io/schema/vega-lite/v5.json"},
+  return {{"$schema", kVegaLite},
           {"title", scene.name},
           {"description",
            fmt::format("{}: error against frame time of every setting; the line is what no setting beats", question.title)},
           {"vconcat", Json::array({plot, text})}};
-}
-
-/// Letters, digits and single underscores.
-std::string slug(const std::string& text) {
-  std::string name;
-  for (const char c : text) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-    if (plain)
-      name += c;
-    else if (!name.empty() && name.back() != '_')
-      name += '_';
-  }
-  while (!name.empty() && name.back() == '_') name.pop_back();
-  return name;
-}
-
-std::string unused_name(const std::string& wanted, std::set<std::string>& used) {
-  std::string name = wanted;
-  for (int i = 2; !used.insert(name).second; ++i) name = fmt::format("{}_{}", wanted, i);
-  return name;
 }
 
 }  // namespace
@@ -409,7 +389,7 @@ WorkPrecision make_work_precision(const std::filesystem::path& path, std::span<c
       result.tables.push_back(front_table(scene, question));
       result.tables.push_back(encodings_table(scene, question));
       if (auto table = unmeasured_table(scene, question)) result.tables.push_back(std::move(*table));
-      result.diagrams.push_back({unused_name("work_precision_" + slug(scene.name), names), diagram(scene, question)});
+      result.diagrams.push_back({diagram_name("work_precision", scene.name, names), diagram(scene, question)});
     }
   }
   return result;

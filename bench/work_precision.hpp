@@ -4,19 +4,12 @@
 
 #include <filesystem>
 #include <span>
-#include <string>
 #include <vector>
 
+#include "bench/diagram.hpp"
 #include "bench/table.hpp"
-#include "structures/encoding.hpp"
 
 namespace amrtex {
-
-/// A plot to be written beside the tables.
-struct Diagram {
-  std::string name;    ///< of its file, without extension; differs from that of every other diagram
-  Json specification;  ///< Vega-Lite 5, with its data
-};
 
 /// A scene is what may be compared: data set, view, transfer function, mode, size, lamp and surfaces, and the filter that errors
 /// are measured against. For each scene and renderer: the fastest setting that reaches each error asked for, the front that no

@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "analytic_fields.hpp"
 #include "block_tree.hpp"
+#include "body_mask.hpp"
 #include "cluster_blocks.hpp"
 #include "hash_random.hpp"
 #include "refine_criterion.hpp"
@@ -119,8 +121,9 @@ ClusterRules read_cluster_rules(SpecReader& reader, int patch) {
   if (cells < patch) reader.refuse("max_patch", fmt::format("an integer from \"patch\" ({}) to {}", patch, kMaxPatch));
   rules.longest_edge = cells / patch;
   rules.efficiency = reader.number("efficiency", 1, "a number above 0, at most 1", [](double e) { return e > 0 && e <= 1; });
-  const bool gaps = reader.find("holes") != nullptr || reader.find("skip_levels") != nullptr;
-  if (rules.efficiency < 1 && gaps) reader.refuse("efficiency", "1 beside \"holes\" or \"skip_levels\"");
+  bool gaps = false;
+  for (const char* key : {"holes", "body", "skip_levels"}) gaps = reader.find(key) != nullptr || gaps;
+  if (rules.efficiency < 1 && gaps) reader.refuse("efficiency", "1 beside \"holes\", \"body\" or \"skip_levels\"");
   return rules;
 }
 
@@ -165,7 +168,7 @@ bool is_hole(const MeshKeys& keys, const Vec3i& block) {
   return glm::distance(middle, keys.holes.center) < keys.holes.radius;
 }
 
-BlockList root_blocks(const MeshKeys& keys, const SpecReader& reader) {
+BlockList root_blocks(const MeshKeys& keys, const std::optional<BodyMask>& body, const SpecReader& reader) {
   const std::int64_t cells = keys.grid.domain(0).cells();
   if (cells > kMaxCells) reader.refuse("root", fmt::format("at most {} cells in all", kMaxCells));
   const Box all{Vec3i(0), keys.grid.blocks(0)};
@@ -176,21 +179,25 @@ BlockList root_blocks(const MeshKeys& keys, const SpecReader& reader) {
     if (!is_hole(keys, block)) blocks.push_back(block);
   });
   if (blocks.empty()) reader.refuse("holes", "holes that leave at least one root block");
+  if (body) std::erase_if(blocks, [&](const Vec3i& block) { return body->place(0, block) == BodyMask::Place::inside; });
   return blocks;
 }
 
-BlockTree make_tree(const MeshKeys& keys, const RefineCriterion& criterion, BlockList root) {
+BlockTree make_tree(const MeshKeys& keys, const RefineCriterion& criterion, const std::optional<BodyMask>& body, BlockList root) {
   const int levels = keys.grid.level_count();
   BlockTree tree{std::vector<BlockList>(static_cast<std::size_t>(levels))};
   tree.add(0, std::move(root));
   for (int level = 0; level + 1 < levels; ++level) {
     const auto l = static_cast<std::size_t>(level);
     const BlockList& blocks = tree.levels[l];
-    tree.add(level + 1, keys.rules.skipped[l] ? all_children(keys.grid, level, blocks)
-                                              : wanted_children(keys.grid, level, blocks, criterion));
+    BlockList children =
+        keys.rules.skipped[l] ? all_children(keys.grid, level, blocks) : wanted_children(keys.grid, level, blocks, criterion);
+    if (body) body->fit_children(level, blocks, children);
+    tree.add(level + 1, std::move(children));
     require_cells(keys.grid, keys.rules, tree);
   }
   close_tree(keys.grid, keys.rules, tree);
+  if (body) body->carve(tree);
   return tree;
 }
 
@@ -293,9 +300,11 @@ MeshDescription generate_mesh(const Json& specification) {
   const NamedFields fields = read_fields(reader, specification);
   const MeshKeys keys = read_mesh_keys(reader, fields.names.front());
   const auto criterion = read_criterion(reader, keys.grid, keys.domain, *fields.fields.front(), keys.seed);
+  const std::optional<BodyMask> body = read_body(reader, specification, keys.grid, keys.domain);
   reader.finish();
 
-  BlockTree tree = make_tree(keys, *criterion, root_blocks(keys, reader));
+  BlockTree tree = make_tree(keys, *criterion, body, root_blocks(keys, body, reader));
+  if (count_cells(keys.grid, tree) == 0) reader.refuse("body", "a body that leaves at least one cell");
   const std::vector<std::vector<Box>> boxes = cluster_tree(keys.grid, keys.rules, keys.patches, tree);
   MeshDescription mesh;
   mesh.name = keys.name;

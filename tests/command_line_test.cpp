@@ -612,6 +612,32 @@ TEST_F(CommandLine, WorkPrecisionIsATableAndADiagram) {
   expect_complaint(run(small_experiment()), 2, AllOf(HasSubstr("tables.json:1:"), HasSubstr("reach")));
 }
 
+TEST_F(CommandLine, AnOrbitIsATableOfCorrelationsAndADiagram) {
+  write_text(at("tables.json"), R"([{"title": "Orbit", "scatter": {"label": "regions", "value": "/work/regions",
+      "against": {"label": "samples a ray", "value": "/work/samples", "over": "/work/rays"}}}])");
+  const Json orbit{{"at", {0.5, 0.5, 0.5}}, {"radius", 3}, {"count", 4}, {"elevation", {-20, 40}}};
+  Json experiment = with(small_experiment(), "views", Json{{"name", "round"}, {"orbit", orbit}});
+  experiment["time_change"] = true;
+  const Result r = run(experiment);
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_THAT(read_text(at("out") / "table.md"), AllOf(HasSubstr("### Orbit"), HasSubstr("4 views"), HasSubstr("correlation")));
+  int diagrams = 0;
+  for (const auto& entry : fs::directory_iterator(at("out")))
+    if (entry.path().filename().string().starts_with("scatter_plt00008")) {
+      ++diagrams;
+      const Json panels = Json::parse(read_text(entry.path()))["hconcat"];
+      EXPECT_THAT(panels[0]["layer"][1]["data"]["values"], SizeIs(4)) << "a point a view";
+    }
+  EXPECT_EQ(diagrams, 3) << "a diagram a structure";
+  for (const auto& entry : fs::directory_iterator(at("out") / "records")) {
+    const Json change = Json::parse(read_text(entry.path()))["change"];
+    EXPECT_GT(change["wall_ms"]["median"].get<double>(), 0);
+    EXPECT_GT(change["bytes"].get<int>(), 0);
+  }
+  write_text(at("tables.json"), R"([{"title": "Orbit", "scatter": {}}])");
+  expect_complaint(run(experiment), 2, AllOf(HasSubstr("tables.json:1:"), HasSubstr("'label'")));
+}
+
 TEST_F(CommandLine, ABaselineThatCannotBeDrawnIsSaidOnce) {
   expect_complaint(run(with(with(small_experiment(), "baseline", true), "filters", {"linear_lod", "linear_page"})), 2,
                    AllOf(HasSubstr("e.json: baseline"), HasSubstr("no filter linear_lod"), HasSubstr("order")));

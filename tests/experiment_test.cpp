@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <fstream>
 #include <set>
 
@@ -192,6 +193,42 @@ TEST(Experiment, ValuesThatAreListsBecomeAxesAsListsOfLists) {
   EXPECT_EQ(e.renders[0].view_name, "view 1.1");
   EXPECT_EQ(e.renders[5].view.eye, Vec3d(0, 3, 0));
   EXPECT_EQ(e.renders[5].transfer_function.extinction[1].extinction, 7);
+}
+
+TEST(Experiment, AnOrbitStandsForItsViews) {
+  // four views at a quarter of a turn from one another, from 30 degrees below to 60 above: at radius 2 the eye of view k lies
+  // 2 cos(e) from the axis and 2 sin(e) above `at`, e = -30 + 30 k degrees
+  const Experiment e = parsed(
+      with("views",
+           R"([{"name": "round", "fov_y": 20, "orbit": {"at": [1, 2, 3], "radius": 2, "count": 4, "elevation": [-30, 60]}}])"));
+  ASSERT_EQ(e.renders.size(), 4u);
+  const double half = std::sqrt(0.75);
+  const std::vector<Vec3d> offsets = {{2 * half, 0, -1}, {0, 2, 0}, {-2 * half, 0, 1}, {0, -1, 2 * half}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(e.renders[i].view_name, fmt::format("round_0{}", i));
+    EXPECT_LT(glm::length(e.renders[i].view.eye - Vec3d(1, 2, 3) - offsets[i]), 1e-12) << i;
+    EXPECT_EQ(e.renders[i].view.at, Vec3d(1, 2, 3));
+    EXPECT_EQ(e.renders[i].view.up, Vec3d(0, 0, 1));
+    EXPECT_EQ(e.renders[i].view.fov_y, 20);
+  }
+  EXPECT_THAT(e.axes, testing::Contains("views[0].orbit"));
+}
+
+TEST(Experiment, AnOrbitAroundAnyAxisStaysAcrossItAtItsRadius) {
+  const Experiment e = parsed(with(
+      "views",
+      R"([{"orbit": {"at": [0, 0, 0], "radius": 3, "count": 120, "axis": [1, 2, -2]}}, {"eye": [3, 0, 0], "at": [0, 0, 0]}])"));
+  ASSERT_EQ(e.renders.size(), 121u);
+  EXPECT_EQ(e.renders[7].view_name, "view 1_007");
+  EXPECT_EQ(e.renders[120].view_name, "view 2");
+  Vec3d sum(0);
+  for (std::size_t i = 0; i < 120; ++i) {
+    const Vec3d eye = e.renders[i].view.eye;
+    EXPECT_NEAR(glm::length(eye), 3, 1e-12);
+    EXPECT_NEAR(glm::dot(eye, Vec3d(1, 2, -2)), 0, 1e-12);
+    sum += eye;
+  }
+  EXPECT_LT(glm::length(sum), 1e-10) << "equal angles all around";
 }
 
 TEST(Experiment, ModesWithoutColourHaveNoTransferFunctionAndAreNotRepeatedForEach) {
@@ -432,6 +469,19 @@ TEST(ExperimentErrors, NameKeyAndWhatIsAccepted) {
       {"views", R"([{"eye": [3, 0, 0], "at": [3, 0, 0]}])", "views[0].eye:", "differ"},
       {"views", R"([{"eye": [3, 0], "at": [0, 0, 0]}])", "views[0].eye:", "three numbers"},
       {"views", R"([{"eye": [3, 0, 0], "looking_at": [0, 0, 0]}])", "views[0]", "looking_at"},
+      {"views", R"([{"orbit": 3}])", "views[0].orbit:", "at, radius, count, axis, elevation"},
+      {"views", R"([{"orbit": {"at": [0, 0, 0], "radius": 1}}])",
+       "views[0].orbit:", "count is missing; accepted: an integer from 1"},
+      {"views", R"([{"orbit": {"at": [0, 0], "radius": 1, "count": 3}}])",
+       "views[0].orbit:", "at [0,0]; accepted: three numbers"},
+      {"views", R"([{"orbit": {"at": [0, 0, 0], "radius": 0, "count": 3}}])", "views[0].orbit:", "above 0"},
+      {"views", R"([{"orbit": {"at": [0, 0, 0], "radius": 1, "count": 3, "axis": [0, 0, 0]}}])", "views[0].orbit:", "not all 0"},
+      {"views", R"([{"orbit": {"at": [0, 0, 0], "radius": 1, "count": 3, "elevation": 90}}])",
+       "views[0].orbit:", "between -90 and 90"},
+      {"views", R"([{"orbit": {"at": [0, 0, 0], "radius": 1, "count": 3, "elevations": 9}}])",
+       "views[0].orbit:", "no key elevations"},
+      {"views", R"([{"eye": [3, 0, 0], "orbit": {"at": [0, 0, 0], "radius": 1, "count": 3}}])",
+       "views[0].eye:", "beside 'orbit'"},
       {"transfer_function", R"({"extinction": []})", "transfer_function", ""},
       {"transfer_function", R"({"opacity": 3})", "transfer_function", "opacity"},
       {"frames", "0", "frames:", "from 1"},
@@ -444,6 +494,8 @@ TEST(ExperimentErrors, NameKeyAndWhatIsAccepted) {
       {"reference", R"({"filter": "cubic"})", "reference.filter:", "own, nearest"},
       {"reference", R"({"filters": "own"})", "reference.filters:", "did you mean 'filter'?"},
       {"reference", R"({"own": false, "filter": "own"})", "reference.own:", "there is no reference"},
+      {"reference", R"({"shading": "flat"})", "reference.shading:", "none, gradient, central, clamped, analytic"},
+      {"time_change", "3", "time_change:", "true or false"},
       {"context", "\"glx\"", "context:", "egl, egl_device, osmesa"},
       {"memory_limit", "0", "memory_limit:", "from 1"},
       {"baseline", "1", "baseline:", "true or false"},
@@ -750,6 +802,50 @@ TEST(TransferFunctions, OfAnUnknownFieldNameThoseThereAre) {
   } catch (const UsageError& error) {
     EXPECT_THAT(error.what(), AllOf(HasSubstr("'rho'"), HasSubstr("blobs_shell, linear")));
   }
+}
+
+TEST(ReferenceShading, IsThePicturesOwnUnlessAnotherIsAskedForAndNamesTheRecordOnlyThen) {
+  const auto hash = [](const Experiment& e) {
+    return configuration_hash(point_configuration(e, e.builds.front(), e.renders.front(), "mesh"));
+  };
+  const Experiment analytic = parsed(with("reference", R"({"shading": "analytic"})"));
+  EXPECT_FALSE(parsed(kSmall).reference->shading);
+  EXPECT_EQ(analytic.reference->shading, Shading::analytic);
+  EXPECT_EQ(hash(parsed(kSmall)), hash(parsed(with("reference", R"({"shading": null})"))));
+  EXPECT_NE(hash(parsed(kSmall)), hash(analytic));
+  Json both = Json::parse(with("reference", R"({"shading": "analytic"})"));
+  both["explain_error"] = true;
+  EXPECT_THAT(complaint(both.dump()), AllOf(HasSubstr("explain_error:"), HasSubstr("own shading")));
+}
+
+TEST(TimeChange, IsOffUnlessAskedForAndNamesTheRecordOnlyThen) {
+  const auto hash = [](const Experiment& e) {
+    return configuration_hash(point_configuration(e, e.builds.front(), e.renders.front(), "mesh"));
+  };
+  EXPECT_FALSE(parsed(kSmall).time_change);
+  EXPECT_TRUE(parsed(with("time_change", "true")).time_change);
+  EXPECT_EQ(hash(parsed(kSmall)), hash(parsed(with("time_change", "false"))));
+  EXPECT_NE(hash(parsed(kSmall)), hash(parsed(with("time_change", "true"))));
+}
+
+// Wald et al. 2020, sections 4.1 to 4.3: each can be switched off alone, and a record's `render` says which were on.
+TEST(SwitchesOfSampling, StandInEveryRecord) {
+  struct Switch {
+    const char *render, *key, *value;
+  };
+  for (const Switch& s :
+       std::initializer_list<Switch>{{R"({})", "sampling", R"("adaptive")"},  // steps of each region's finest cell
+                                     {R"({"sampling": "lattice"})", "sampling", R"("lattice")"},
+                                     {R"({})", "integrator", R"("exponential_midpoint")"},        // middles, opacity
+                                     {R"({"integrator": "left"})", "integrator", R"("left")"},    // no middles
+                                     {R"({"integrator": "euler"})", "integrator", R"("euler")"},  // no 1 - exp
+                                     {R"({})", "ray_offset", "false"},
+                                     {R"({"ray_offset": true})", "ray_offset", "true"},
+                                     {R"({})", "early_end", "null"},
+                                     {R"({"early_end": 0.98})", "early_end", "0.98"},
+                                     {R"({})", "skip", "true"},
+                                     {R"({"skip": false})", "skip", "false"}})
+    EXPECT_EQ(render_json(parsed(with("render", s.render)).renders.front()).at(s.key).dump(), s.value) << s.render;
 }
 
 }  // namespace

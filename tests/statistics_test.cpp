@@ -85,5 +85,30 @@ TEST(Summary, RefusesNothingAndNoNumbers) {
   EXPECT_THROW(summarize(Samples{INFINITY}), Error);
 }
 
+TEST(LinearFit, IsTheLineWhereThereIsOne) {
+  const auto fit = fit_line(Samples{1, 2, 4}, Samples{1, -1, -5});  // y = 3 - 2 x
+  ASSERT_TRUE(fit);
+  EXPECT_NEAR(fit->slope, -2, 1e-14);
+  EXPECT_NEAR(fit->at_zero, 3, 1e-14);
+  EXPECT_NEAR(fit->correlation, -1, 1e-14);
+}
+
+TEST(LinearFit, HasTheSlopeOfLeastSquares) {
+  // means 1 and 1; sums of products of deviations: xx 2, xy 1, yy 2; r = 1/2
+  const auto fit = fit_line(Samples{0, 1, 2}, Samples{1, 0, 2});
+  ASSERT_TRUE(fit);
+  EXPECT_NEAR(fit->slope, 0.5, 1e-14);
+  EXPECT_NEAR(fit->at_zero, 0.5, 1e-14);
+  EXPECT_NEAR(fit->correlation, 0.5, 1e-14);
+}
+
+TEST(LinearFit, IsNothingWhereALineMeansNothing) {
+  EXPECT_FALSE(fit_line(Samples{0, 1}, Samples{0, 1}));
+  EXPECT_FALSE(fit_line(Samples{2, 2, 2}, Samples{0, 1, 2}));
+  EXPECT_FALSE(fit_line(Samples{0, 1, 2}, Samples{2, 2, 2}));
+  EXPECT_THROW(fit_line(Samples{0, 1, 2}, Samples{2, 2}), Error);
+  EXPECT_THROW(fit_line(Samples{0, 1, NAN}, Samples{2, 2, 1}), Error);
+}
+
 }  // namespace
 }  // namespace amrtex

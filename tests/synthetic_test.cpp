@@ -448,6 +448,56 @@ TEST(Holes, StayEmptyWhereTheLevelJumpWouldRefineThem) {
   EXPECT_NEAR(refined.statistics(0).volume_integral, coarse.statistics(0).volume_integral, 1e-12);
 }
 
+// exp(-(r / 0.25)^2 / 2) is above exp(-1/2) inside of a ball of radius 1/4
+const char* kBallBody =
+    R"({"field": {"type": "shell", "radius": 1e-9, "width": 0.25, "amplitude": 1}, "above": 0.6065306597126334})";
+
+TEST(Body, HoldsNoCellAndIsCutOutWithTheFinestBlocks) {
+  Json specification = parse(R"({"field": {"type": "constant", "value": 1}, "levels": 4, "root": 8, "patch": 2, "refine":
+      {"criterion": "random", "fraction": 0}})");
+  specification["body"] = parse(kBallBody);
+  for (const int level_jump : {0, 1}) {
+    specification["level_jump"] = level_jump;
+    const AmrHierarchy mesh = make_hierarchy(specification);
+    const Box domain = mesh.domain(3);
+    const auto in_body = [](const Vec3i& cell) {  // by the middle of its block of 2 cells
+      return glm::length((2.0 * Vec3d(cell / 2) + 1.0) / 64.0 - 0.5) < 0.25;
+    };
+    int wrong = 0;
+    int coarse_at_the_surface = 0;
+    for_each_cell(domain, [&](const Vec3i& cell) {
+      const auto leaf = mesh.find_leaf(cell);
+      wrong += leaf.has_value() == in_body(cell) ? 1 : 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        Vec3i next = cell;
+        if (++next[axis] < 64 && in_body(next) != in_body(cell))
+          coarse_at_the_surface += mesh.find_leaf(in_body(cell) ? next : cell)->level != 3 ? 1 : 0;
+      }
+    });
+    EXPECT_EQ(wrong, 0) << "level_jump " << level_jump;
+    EXPECT_EQ(coarse_at_the_surface, 0) << "level_jump " << level_jump;
+    EXPECT_TRUE(mesh.has_holes());
+    EXPECT_GT(mesh.leaf_cells(level_jump == 0 ? 0 : 1), 0);
+    EXPECT_LE(largest_jump(mesh), level_jump == 0 ? 3 : 1);
+    EXPECT_NEAR(mesh.statistics(0).volume_integral, 1 - 4.0 / 3 * std::numbers::pi / 64, 0.004);
+  }
+}
+
+TEST(Body, LeavesTheCellsOutsideAsTheyAre) {
+  Json specification = parse(R"({"field": "blobs", "levels": 3, "root": 16, "patch": 4, "max_patch": 16, "refine":
+      {"criterion": "surface", "isovalue": 0.3}})");
+  const AmrHierarchy whole = make_hierarchy(specification);
+  specification["body"] = parse(R"({"field": {"type": "step", "offset": 0.5}, "above": 0.5})");  // the half x >= 1/2
+  const AmrHierarchy half = make_hierarchy(specification);
+  double worst = 0;
+  for_each_cell(half.domain(2), [&](const Vec3i& cell) {
+    const auto kept = half.find_leaf(cell);
+    EXPECT_EQ(kept.has_value(), cell.x < 32);
+    if (kept) worst = std::max(worst, static_cast<double>(whole.find_leaf(cell)->level - kept->level));
+  });
+  EXPECT_EQ(worst, 0) << "a body may refine what is at its surface, and nothing becomes coarser";
+}
+
 TEST(MissingValues, TakeTheirFractionOfLeafCells) {
   const AmrHierarchy mesh = make_hierarchy(parse(R"({"field": "blobs", "levels": 2, "root": 32, "patch": 8, "nan_fraction": 0.1,
       "refine": {"criterion": "random", "fraction": 0.5}})"));
@@ -523,6 +573,14 @@ TEST(BadSpecification, IsAUsageErrorThatNamesKeyValueAndWhatIsAccepted) {
       {R"({"holes": 1})", {"\"holes\"", "1", "at least one root block"}},
       {R"({"holes": {"radius": 1}})", {"\"holes.center\"", "a list of 3"}},
       {R"({"holes": {"center": [0, 0, 0], "radius": 0}})", {"\"holes.radius\"", "0", "above 0"}},
+      {R"({"body": 1})", {"\"body\"", "1", "\"field\"", "\"above\""}},
+      {R"({"body": {"above": 1}})", {"\"body.field\"", "a field"}},
+      {R"({"body": {"field": "blobs"}})", {"\"body.above\"", "a finite number"}},
+      {R"({"body": {"field": "blobs", "above": "x"}})", {"\"body.above\"", "\"x\"", "a finite number"}},
+      {R"({"body": {"field": "blobs", "above": 1, "below": 2}})", {"\"body.below\"", "2", "field, above"}},
+      {R"({"body": {"field": "blob", "above": 1}})", {"\"field\"", "\"blob\"", "blobs_shell"}},
+      {R"({"body": {"field": "constant", "above": 0}})", {"\"body\"", "at least one cell"}},
+      {R"({"efficiency": 0.5, "body": {"field": "blobs", "above": 1}})", {"\"efficiency\"", "0.5", "body"}},
       {R"({"nan_fraction": -0.1})", {"\"nan_fraction\"", "-0.1", "from 0 to 1"}},
       {R"({"averaged": 1})", {"\"averaged\"", "1", "true or false"}},
       {R"({"seed": -1})", {"\"seed\"", "-1", "an integer from 0"}},
