@@ -29,36 +29,11 @@ constexpr int kMaxFrames = 1000000;
 constexpr int kMostLevel = 63;
 constexpr double kAnyNumber = std::numeric_limits<double>::max();
 
-constexpr auto kAvailableRenderKeys = std::to_array<std::string_view>({"mode",
-                                                                       "sampling",
-                                                                       "step",
-                                                                       "width",
-                                                                       "height",
-                                                                       "skip",
-                                                                       "early_end",
-                                                                       "consumer",
-                                                                       "slice_target",
-                                                                       "integrator",
-                                                                       "isovalues",
-                                                                       "iso_opacity",
-                                                                       "surface_color",
-                                                                       "iso_tolerance",
-                                                                       "shading",
-                                                                       "output",
-                                                                       "color_field",
-                                                                       "point_light",
-                                                                       "ambient",
-                                                                       "shadow_step",
-                                                                       "level_of_detail",
-                                                                       "max_level",
-                                                                       "tolerance",
-                                                                       "prune",
-                                                                       "needs",
-                                                                       "clip_planes",
-                                                                       "ray_offset",
-                                                                       "mirror",
-                                                                       "ambient_occlusion",
-                                                                       "triangles"});
+constexpr auto kAvailableRenderKeys = std::to_array<std::string_view>(
+    {"mode",     "sampling",     "step",        "width",      "height",      "triangles",        "skip",          "early_end",
+     "consumer", "slice_target", "integrator",  "isovalues",  "iso_opacity", "surface_color",    "iso_tolerance", "shading",
+     "output",   "color_field",  "point_light", "ambient",    "shadow_step", "level_of_detail",  "max_level",     "tolerance",
+     "prune",    "needs",        "clip_planes", "ray_offset", "mirror",      "ambient_occlusion"});
 constexpr std::array<std::string_view, 2> kNeeds = {"scene", "all"};
 constexpr std::array<std::string_view, 3> kContexts = {"egl", "egl_device", "osmesa"};
 

@@ -14,7 +14,7 @@ namespace amrtex {
 namespace {
 
 constexpr std::uint32_t kLeaf = 4;       // triangles
-constexpr std::size_t kMostNodes = 128;  // on the way down: halves of at most 2^32 triangles, two a level at most
+constexpr std::size_t kMostNodes = 128;  // open at a time: one a level, and 2^31 triangles are halved 29 times
 constexpr double kSlack = 1 + 16 * std::numeric_limits<double>::epsilon();  // of where a ray leaves a box: rounding loses none
 
 bool finite(const Vec3d& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }

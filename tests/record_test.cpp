@@ -78,6 +78,16 @@ TEST(ValidateRecord, AcceptsZeroErrorAndExtraKeys) {
   EXPECT_TRUE(record["error"]["psnr_db"].is_null());
 }
 
+TEST(ValidateRecord, TakesAnErrorByCauseAndHowWellItAddsUp) {
+  Json record = good_record();
+  record["error"]["split"] = {{"step", {{"rmse", 0.1}, {"max", 0.2}}}, {"storage", nullptr}, {"sum_closes", 1e-16}};
+  EXPECT_EQ(complaint(record), "valid");
+  record["error"]["split"]["sum_closes"] = "0";
+  EXPECT_THAT(complaint(record), HasSubstr("/error/split/sum_closes: a number"));
+  record["error"]["split"] = {{"step", {{"rmse", 0.1}}}};
+  EXPECT_THAT(complaint(record), HasSubstr("/error/split/step/max: a number"));
+}
+
 struct Damage {
   const char* pointer;
   Json value;  ///< discarded = the key is removed
