@@ -77,23 +77,23 @@ int define(const SceneBindings& b, std::string_view name) {
 // ---- closed forms
 
 TEST(Fields, OfConstantsAddTheirExtinctionsAndMixTheirColours) {
-  // alpha = 1 - exp(-(k1 + k2 + k3) L), C = (k1 c1 + k2 c2 + k3 c3) / (k1 + k2 + k3) alpha
-  const AmrHierarchy h = nested(constant(1)).also("g", constant(2)).also("h", constant(3)).hierarchy();
-  TransferFunction first = constant_light(1.5);
-  TransferFunction second = constant_light(0.4);
-  TransferFunction third = constant_light(1.1);
-  first.color = {{0, {1, 0, 0}}};
-  second.color = {{0, {0, 1, 0}}};
-  third.color = {{0, {0, 0, 1}}};
-  third.length_unit = TransferFunction::LengthUnit::world;  // the same in a unit cube
-  for_each_taking(h, {1, 2}, [&](const EncodingCase& c) {
+  // alpha = 1 - exp(-sum k L), C = sum k c / sum k alpha
+  const AmrHierarchy h = nested(constant(1)).also("g", constant(2)).also("h", constant(3)).also("i", constant(-4)).hierarchy();
+  const auto light = [](double extinction, const Vec3d& rgb) {
+    TransferFunction tf = constant_light(extinction);
+    tf.color = {{0, rgb}};
+    return tf;
+  };
+  std::vector<FieldTransfer> others{{"g", light(0.4, {0, 1, 0})}, {"h", light(1.1, {0, 0, 1})}, {"i", light(0.5, {0, 1, 1})}};
+  others[1].transfer_function.length_unit = TransferFunction::LengthUnit::world;  // the same in a unit cube
+  for_each_taking(h, {1, 2, 3}, [&](const EncodingCase& c) {
     for (const Sampling sampling : kSamplings)
-      for (const bool three : {false, true}) {
-        Scene scene = fields_scene(sampling, first, {{"g", second}});
-        if (three) scene.more_fields.push_back({"h", third});
-        const double k = three ? 3.0 : 1.9;
-        const Vec3d rgb = Vec3d(1.5, 0.4, three ? 1.1 : 0) / k;
-        const EncodedField field = build_for(h, c, scene, 0, three ? std::vector{1, 2} : std::vector{1});
+      for (const bool all : {false, true}) {
+        Scene scene = fields_scene(sampling, light(1.5, {1, 0, 0}), others);
+        if (!all) scene.more_fields.resize(1);
+        const double k = all ? 3.5 : 1.9;
+        const Vec3d rgb = (all ? Vec3d(1.5, 0.9, 1.6) : Vec3d(1.5, 0.4, 0)) / k;
+        const EncodedField field = build_for(h, c, scene, 0, all ? std::vector{1, 2, 3} : std::vector{1});
         const auto worst = [&](const Picture& picture) {
           double off = 0;
           for (int y = 0; y < kPixels; ++y)
@@ -107,7 +107,7 @@ TEST(Fields, OfConstantsAddTheirExtinctionsAndMixTheirColours) {
         };
         EXPECT_LE(worst(render_on_cpu(h, field, scene, true)), 1e-12);
         EXPECT_LE(worst(HierarchyReference(h, 0, field.definition).render(scene, 1)), 1e-12);
-        if (sampling != Sampling::lattice || !three) continue;
+        if (sampling != Sampling::lattice || !all) continue;
         EXPECT_LE(worst(draw(context(ContextKind::egl), h, field, scene)), 3e-6);
       }
   });
