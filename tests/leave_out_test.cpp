@@ -585,14 +585,30 @@ void for_each_pruning_case(F&& f) {
   });
 }
 
+/// A ball in a corner, in patches of 4^3 cells; a part of it refined.
+const AmrHierarchy& ball_in_patches() {
+  static const AmrHierarchy h = [] {
+    const auto ball = [](const Vec3d& p) { return std::max(0.0, 1.2 - 4 * glm::distance(p, Vec3d(0.2))); };
+    MeshBuilder mesh(Vec3i(32), {2});
+    for_each_cell({Vec3i(0), Vec3i(8)}, [&](const Vec3i& b) { mesh.patch(0, {b * 4, (b + 1) * 4}, ball); });
+    mesh.patch(1, {Vec3i(8), Vec3i(16)}, ball);
+    return mesh.hierarchy();
+  }();
+  return h;
+}
+
+/// Under `basis` hidden leaves stay where visible ones read them: next to all of those of the blobs.
+const AmrHierarchy& pruned_mesh(const EncodingCase& c) { return c.filter == Filter::basis ? ball_in_patches() : blobs(); }
+
 TEST(Prune, DropsNineTenthsOfWhatIsHiddenAtTheEncodingsGranularity) {
   const Scene scene = volume();
   for_each_pruning_case([&](const EncodingCase& c) {
     for (const Storage storage : {Storage::r32f, Storage::r16}) {
       SCOPED_TRACE(format_name(storage));
-      const EncodedField whole = build(blobs(), c, {.storage = storage});
-      const EncodedField pruned = build(blobs(), c, {.storage = storage, .invisible = invisible_of(scene)});
-      const double share = brute_force(blobs(), whole, scene.transfer_function).share();
+      const AmrHierarchy& h = pruned_mesh(c);
+      const EncodedField whole = build(h, c, {.storage = storage});
+      const EncodedField pruned = build(h, c, {.storage = storage, .invisible = invisible_of(scene)});
+      const double share = brute_force(h, whole, scene.transfer_function).share();
       const double saved = 1 - static_cast<double>(value_bytes(pruned)) / static_cast<double>(value_bytes(whole));
       EXPECT_GT(share, 0.1) << "little is hidden: this tests nothing";
       EXPECT_GE(saved, 0.9 * share);
@@ -610,15 +626,16 @@ TEST(Prune, DropsNineTenthsOfWhatIsHiddenAtTheEncodingsGranularity) {
 TEST(Prune, LeavesThePictureTheSameToTheBit) {
   Context& gl = context(ContextKind::egl);
   for_each_pruning_case([&](const EncodingCase& c) {
-    const EncodedField whole = build(blobs(), c);
-    const EncodedField pruned = build(blobs(), c, {.invisible = invisible_of(volume())});
+    const AmrHierarchy& h = pruned_mesh(c);
+    const EncodedField whole = build(h, c);
+    const EncodedField pruned = build(h, c, {.invisible = invisible_of(volume())});
     for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive})
       for (const bool skip : {true, false}) {
         SCOPED_TRACE(fmt::format("{} skip {}", sampling_name(sampling), skip));
         const Scene scene = volume(sampling, skip);
-        const Picture picture = draw(gl, blobs(), whole, scene);
+        const Picture picture = draw(gl, h, whole, scene);
         EXPECT_GT(largest(picture), 0.1);
-        EXPECT_EQ(difference(picture, draw(gl, blobs(), pruned, scene)), 0);
+        EXPECT_EQ(difference(picture, draw(gl, h, pruned, scene)), 0);
       }
   });
 }
@@ -628,8 +645,9 @@ TEST(Prune, DropsWhatShadersSkipAndNothingElse) {
   const Scene scene = volume(Sampling::adaptive);
   for_each_pruning_case([&](const EncodingCase& c) {
     WorkCounts all, left;
-    draw(gl, blobs(), build(blobs(), c), scene, &all);
-    draw(gl, blobs(), build(blobs(), c, {.invisible = invisible_of(scene)}), scene, &left);
+    const AmrHierarchy& h = pruned_mesh(c);
+    draw(gl, h, build(h, c), scene, &all);
+    draw(gl, h, build(h, c, {.invisible = invisible_of(scene)}), scene, &left);
     if (!keeps_regions(c)) {  // fewer steps through what is hidden
       EXPECT_LE(left.samples, all.samples);
       EXPECT_LT(left.regions, all.regions);
