@@ -1,6 +1,9 @@
 // Leaves of the kD-tree as boxes of hats (filter basis): which of them reach into which.
 #pragma once
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -60,6 +63,28 @@ inline void add_reaching_values(const AmrHierarchy& h, int field, const Tree& tr
     level_values(h, field, tree.leaves[static_cast<std::size_t>(other)].level, cells, values);
     for (const double v : values) range.add(v);
   });
+}
+
+/// A region's floats tell places to 2^-25 of its extent: enough while that is at most so many of the finest cells that reach in.
+inline constexpr std::int64_t kMostReachingCells = 2048;
+
+/// Throws UnsupportedError where a leaf is wider than that.
+inline void require_places(const AmrHierarchy& h, const Tree& tree, const std::vector<HatNode>& nodes) {
+  for (const Leaf& leaf : tree.leaves) {
+    int finest = leaf.level;
+    for_each_hat(h, tree, nodes, leaf,
+                 [&](int other, const Box&) { finest = std::max(finest, tree.leaves[static_cast<std::size_t>(other)].level); });
+    if (finest == leaf.level) continue;  // as under the other filters
+    const Vec3i size = leaf.cells.size();
+    const std::int64_t extent =
+        std::max({size.x, size.y, size.z}) * std::int64_t{h.cell_width(leaf.level)} / h.cell_width(finest);
+    if (extent > kMostReachingCells)
+      throw UnsupportedError(
+          fmt::format("encoding kd_tree: filter basis: a leaf of level {} is {} of the cells of level {} wide whose hats reach "
+                      "into it; accepted: "
+                      "at most {}, beyond which floats place samples badly; exabricks cuts its regions there",
+                      leaf.level, extent, finest, kMostReachingCells));
+  }
 }
 
 /// Of leaves that show nothing, keeps the mark of those whose hats reach into such leaves alone: others read the rest.

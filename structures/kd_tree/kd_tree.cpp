@@ -382,6 +382,7 @@ Plan KdTree::plan(const AmrHierarchy& h, const BuildRequest& request, const Opti
   p.pruned = prune(h, request, o, p.tree);
   if (o.hats) {
     p.hats = hat_nodes(h, p.tree);
+    require_places(h, p.tree, p.hats);
     p.supports = SupportList(p.hats, hat_code);
   }
   if (o.detail) add_detail_blocks(h, p.tree);

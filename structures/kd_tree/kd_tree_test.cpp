@@ -849,6 +849,17 @@ TEST(KdTree, ALevelOfDetailIsRefusedWithBasisByName) {
                     HasSubstr("accepted: nearest, linear_lod, linear_vertex")));
 }
 
+TEST(KdTree, JumpsThatFloatsCannotPlaceAreRefusedWithBasisAlone) {
+  // 150 root cells beside cells 16 times finer: 149 are 2384 of these wide
+  const AmrHierarchy h = MeshBuilder({150, 1, 1}, {16}).root(waves).patch(1, {{0, 0, 0}, {16, 16, 16}}, waves).hierarchy();
+  BuildRequest request;
+  EXPECT_EQ(refusal(h, request), "built");
+  request.needs.filter = Filter::basis;
+  EXPECT_THAT(refusal(h, request),
+              AllOf(HasSubstr("unsupported: encoding kd_tree: filter basis"), HasSubstr("2384 of the cells of level 1"),
+                    HasSubstr("at most 2048"), HasSubstr("exabricks")));
+}
+
 TEST(KdTree, RefusesBadParametersWithWhatIsAccepted) {
   const AmrHierarchy h = refined_corner();
   for (const char* name : {"storage_kind", "packing", "traversal"})
