@@ -455,7 +455,7 @@ TEST(Skipping, LeavesSurfacesAsTheyAre) {
 
 TEST(Skipping, LeavesSurfacesAsTheyAreOnGl) {
   const AmrHierarchy h = holes_and_missing(waves).hierarchy();
-  for_each_filter([&](const EncodingCase& c) {
+  for_each_encoding([&](const EncodingCase& c) {
     const EncodedField field = build(h, c);
     WorkCounts all_work;
     WorkCounts skipped_work;

@@ -158,7 +158,7 @@ TEST(Mirror, TurnsDepthsAndNormalsRoundWithTheSurface) {
 TEST(Mirror, IsTheSameOnGl) {
   const AmrHierarchy h = nested(waves).hierarchy();
   const View view = perspective({2.9, -1.9, 1.6}, {1, 0.5, 0.5});
-  for_each_filter([&](const EncodingCase& c) {
+  for_each_encoding([&](const EncodingCase& c) {
     const EncodedField field = build(h, c);
     for (const Mode mode : {Mode::dvr, Mode::dvr_iso}) {
       const Scene scene = mirror_scene(mode, mode == Mode::dvr ? Sampling::lattice : Sampling::adaptive, Mirror{0, true}, view);

@@ -14,16 +14,27 @@ void for_each_case(F&& f) {
   }
 }
 
-/// One case of each encoding and filter, its last: the smallest structures. Compiling shaders is what
-/// these tests take their time for.
-template <class F>
-void for_each_filter(F&& f) {
+/// The last case of each group that `same` tells: the smallest structures.
+template <class Same, class F>
+void for_each_last(Same&& same, F&& f) {
   const auto& cases = encoding_cases();
   for (std::size_t i = 0; i < cases.size(); ++i) {
-    if (i + 1 < cases.size() && cases[i + 1].encoding == cases[i].encoding && cases[i + 1].filter == cases[i].filter) continue;
+    if (i + 1 < cases.size() && same(cases[i], cases[i + 1])) continue;
     SCOPED_TRACE(cases[i].name());
     f(cases[i]);
   }
+}
+
+/// One case of each encoding and filter. Compiling shaders is what these tests take their time for.
+template <class F>
+void for_each_filter(F&& f) {
+  for_each_last([](const EncodingCase& a, const EncodingCase& b) { return a.encoding == b.encoding && a.filter == b.filter; }, f);
+}
+
+/// One case of each encoding: for the dearest shaders, where the CPU builds of the same text are asked with every filter.
+template <class F>
+void for_each_encoding(F&& f) {
+  for_each_last([](const EncodingCase& a, const EncodingCase& b) { return a.encoding == b.encoding; }, f);
 }
 
 }  // namespace amrtex::test

@@ -68,7 +68,11 @@ inline void add_reaching_values(const AmrHierarchy& h, int field, const Tree& tr
 /// A region's floats tell places to 2^-25 of its extent: enough while that is at most so many of the finest cells that reach in.
 inline constexpr std::int64_t kMostReachingCells = 2048;
 
-/// Throws UnsupportedError where a leaf is wider than that.
+/// Finer hats begin inside of a leaf, in a layer of half of their cell, and regions are not cut there: an adaptive step of the
+/// leaf's own cell width must not pass over more than so many of these cells.
+inline constexpr int kMostCellsInAStep = 64;
+
+/// Throws UnsupportedError where a leaf is wider than that, or its cells are.
 inline void require_places(const AmrHierarchy& h, const Tree& tree, const std::vector<HatNode>& nodes) {
   for (const Leaf& leaf : tree.leaves) {
     int finest = leaf.level;
@@ -84,6 +88,11 @@ inline void require_places(const AmrHierarchy& h, const Tree& tree, const std::v
                       "into it; accepted: "
                       "at most {}, beyond which floats place samples badly; exabricks cuts its regions there",
                       leaf.level, extent, finest, kMostReachingCells));
+    if (const int ratio = h.cell_width(leaf.level) / h.cell_width(finest); ratio > kMostCellsInAStep)
+      throw UnsupportedError(fmt::format(
+          "encoding kd_tree: filter basis: hats of level {} reach into a leaf of level {} whose cells are {} times as wide; "
+          "accepted: at most {} times, beyond which steps of the leaf pass over them; exabricks cuts its regions there",
+          finest, leaf.level, ratio, kMostCellsInAStep));
   }
 }
 

@@ -860,6 +860,21 @@ TEST(KdTree, JumpsThatFloatsCannotPlaceAreRefusedWithBasisAlone) {
                     HasSubstr("at most 2048"), HasSubstr("exabricks")));
 }
 
+TEST(KdTree, JumpsThatAStepPassesOverAreRefusedWithBasisAlone) {
+  for (const int ratio : {64, 128}) {
+    const AmrHierarchy h =
+        MeshBuilder({5, 1, 1}, {ratio}).root(waves).patch(1, {Vec3i(0), Vec3i(ratio, ratio, ratio)}, waves).hierarchy();
+    BuildRequest request;
+    EXPECT_EQ(refusal(h, request), "built");
+    request.needs.filter = Filter::basis;
+    if (ratio == 64)
+      EXPECT_EQ(refusal(h, request), "built");
+    else
+      EXPECT_THAT(refusal(h, request), AllOf(HasSubstr("unsupported: encoding kd_tree: filter basis"),
+                                             HasSubstr("128 times as wide"), HasSubstr("at most 64"), HasSubstr("exabricks")));
+  }
+}
+
 TEST(KdTree, RefusesBadParametersWithWhatIsAccepted) {
   const AmrHierarchy h = refined_corner();
   for (const char* name : {"storage_kind", "packing", "traversal"})
