@@ -4,17 +4,15 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <stdlib.h>  // mkdtemp
-
-#include <fstream>
 
 #include "bench/record.hpp"
 #include "structures/error.hpp"
+#include "tests/table_files.hpp"
 
 namespace amrtex {
 namespace {
 
-namespace fs = std::filesystem;
+using test::cells;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -52,33 +50,12 @@ const std::vector<Json>& seven_views() {
   return records;
 }
 
-class ScatterTest : public testing::Test {
+class ScatterTest : public test::TablesFileTest {
  protected:
-  ScatterTest() {
-    std::string name = (fs::temp_directory_path() / "amrtex_scatter_XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw Error("no temporary folder");
-    folder_ = name;
-  }
-  ~ScatterTest() override { fs::remove_all(folder_); }
-
   Scatter made(const std::vector<Json>& records, const std::string& tables = kTables) const {
-    std::ofstream(folder_ / "tables.json") << tables;
-    return make_scatter(folder_ / "tables.json", records);
+    return make_scatter(tables_file(tables), records);
   }
-
- private:
-  fs::path folder_;
 };
-
-std::vector<std::string> cells(const Table& table, const std::string& key) {
-  for (std::size_t c = 0; c < table.columns.size(); ++c)
-    if (table.columns[c].key == key) {
-      std::vector<std::string> list;
-      for (const auto& row : table.rows) list.push_back(format_cell(row[c]));
-      return list;
-    }
-  return {"no such column"};
-}
 
 TEST_F(ScatterTest, ShowsCorrelationAndLineOfEverySettingOverItsViews) {
   const Scatter result = made(seven_views());

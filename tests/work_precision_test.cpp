@@ -4,18 +4,16 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <stdlib.h>  // mkdtemp
-
-#include <fstream>
 
 #include "bench/pareto.hpp"
 #include "bench/record.hpp"
 #include "structures/error.hpp"
+#include "tests/table_files.hpp"
 
 namespace amrtex {
 namespace {
 
-namespace fs = std::filesystem;
+using test::cells;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -84,33 +82,12 @@ Json exact(Json r) {
   return r;
 }
 
-class WorkPrecisionTest : public testing::Test {
+class WorkPrecisionTest : public test::TablesFileTest {
  protected:
-  WorkPrecisionTest() {
-    std::string name = (fs::temp_directory_path() / "amrtex_work_precision_XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw Error("no temporary folder");
-    folder_ = name;
-  }
-  ~WorkPrecisionTest() override { fs::remove_all(folder_); }
-
   WorkPrecision made(const std::vector<Json>& records, const std::string& tables = R"([{"work_precision": {}}])") const {
-    std::ofstream(folder_ / "tables.json") << tables;
-    return make_work_precision(folder_ / "tables.json", records);
+    return make_work_precision(tables_file(tables), records);
   }
-
- private:
-  fs::path folder_;
 };
-
-std::vector<std::string> cells(const Table& table, const std::string& key) {
-  for (std::size_t c = 0; c < table.columns.size(); ++c)
-    if (table.columns[c].key == key) {
-      std::vector<std::string> list;
-      for (const auto& row : table.rows) list.push_back(format_cell(row[c]));
-      return list;
-    }
-  return {"no such column"};
-}
 
 const std::vector<Json>& four_settings() {
   static const std::vector<Json> records = {record({"uniform", "r32f", 1, 8, 45}), record({"uniform", "r32f", 0.25, 30, 65}),

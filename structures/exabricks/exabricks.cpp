@@ -153,25 +153,30 @@ bool has_value(const Plan& p, const Stores& stores, int number, std::size_t texe
   return ((words[texel / 32] >> (texel % 32)) & 1U) != 0;
 }
 
-RegionFacts region_facts(const Plan& p, int border, const Region& r, const Stores& stores, StorageScale scale) {
-  RegionFacts facts;
-  const HostTexture& pool = stores.pools.front();
+/// Calls f(texel) for every stored cell of a region's pieces.
+template <class F>
+void for_each_stored_cell(const Plan& p, int border, const Region& r, const HostTexture& pool, F&& f) {
   const Box all{Vec3i(0), pool.size};
   for (int k = 0; k < r.pieces; ++k) {
     const Piece& piece = p.set.pieces[static_cast<std::size_t>(r.first_piece + k)];
     const auto brick = static_cast<std::size_t>(piece.brick);
     const Vec3i shift = p.packing.at[brick] + Vec3i(border) - p.tree.bricks[brick].cells.lower;
-    for_each_cell(piece.cells, [&](const Vec3i& c) {
-      const std::size_t texel = all.offset(c + shift);
-      bool has = true;
-      for (std::size_t number = 0; p.missing && number < stores.pools.size(); ++number) {
-        const bool bit = has_value(p, stores, static_cast<int>(number), texel);
-        if (number == 0) has = bit;
-        facts.missing = facts.missing || !bit;
-      }
-      if (has) facts.range.add(load_value(pool.format, scale, pool.data.data(), texel));
-    });
+    for_each_cell(piece.cells, [&](const Vec3i& c) { f(all.offset(c + shift)); });
   }
+}
+
+RegionFacts region_facts(const Plan& p, int border, const Region& r, const Stores& stores, StorageScale scale) {
+  RegionFacts facts;
+  const HostTexture& pool = stores.pools.front();
+  for_each_stored_cell(p, border, r, pool, [&](std::size_t texel) {
+    bool has = true;
+    for (std::size_t number = 0; p.missing && number < stores.pools.size(); ++number) {
+      const bool bit = has_value(p, stores, static_cast<int>(number), texel);
+      if (number == 0) has = bit;
+      facts.missing = facts.missing || !bit;
+    }
+    if (has) facts.range.add(load_value(pool.format, scale, pool.data.data(), texel));
+  });
   return facts;
 }
 
@@ -179,16 +184,9 @@ RegionFacts region_facts(const Plan& p, int border, const Region& r, const Store
 ValueRange range_in_field(const Plan& p, int border, const Region& r, const Stores& stores, StorageScale scale, int number) {
   ValueRange range;
   const HostTexture& pool = stores.pools[static_cast<std::size_t>(number)];
-  const Box all{Vec3i(0), pool.size};
-  for (int k = 0; k < r.pieces; ++k) {
-    const Piece& piece = p.set.pieces[static_cast<std::size_t>(r.first_piece + k)];
-    const auto brick = static_cast<std::size_t>(piece.brick);
-    const Vec3i shift = p.packing.at[brick] + Vec3i(border) - p.tree.bricks[brick].cells.lower;
-    for_each_cell(piece.cells, [&](const Vec3i& c) {
-      const std::size_t texel = all.offset(c + shift);
-      if (!p.missing || has_value(p, stores, number, texel)) range.add(load_value(pool.format, scale, pool.data.data(), texel));
-    });
-  }
+  for_each_stored_cell(p, border, r, pool, [&](std::size_t texel) {
+    if (!p.missing || has_value(p, stores, number, texel)) range.add(load_value(pool.format, scale, pool.data.data(), texel));
+  });
   return range;
 }
 
