@@ -1,9 +1,9 @@
 # amrtex_add_encoding(name): the one line that an encoding needs outside its folder.
 # It registers structures/<name>/, from which are made
 #   - the build side        <name>.cpp, with `std::unique_ptr<Encoding> make_<name>()` declared in <name>.hpp
-#   - the registry entry    (structures/registry.cpp.in)
+#   - the registry entry    (structures/common/registry.cpp.in)
 #   - the shader library    every .glsl and .h of the folder
-#   - the CPU build         <name>.glsl compiled as C++ (renderers/cpu_field.cpp.in)
+#   - the CPU build         <name>.glsl compiled as C++ (renderers/cpu/cpu_field.cpp.in)
 #   - the tests             <name>_test.cpp; conformance and differential tests run over the registry
 define_property(GLOBAL PROPERTY AMRTEX_ENCODINGS BRIEF_DOCS "Names of all encodings, in order")
 

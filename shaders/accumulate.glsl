@@ -10,7 +10,7 @@
 DEFINE_INT(AMRTEX_MODE)
 DEFINE_INT(AMRTEX_INTEGRATOR)
 
-// the same numbers as enum class Mode (renderers/scene.hpp)
+// the same numbers as enum class Mode (renderers/scene/scene.hpp)
 #define AMRTEX_MODE_DVR 0
 #define AMRTEX_MODE_PROJECTION 1
 #define AMRTEX_MODE_MIP 2
@@ -18,7 +18,7 @@ DEFINE_INT(AMRTEX_INTEGRATOR)
 #define AMRTEX_MODE_DVR_ISO 4
 #define AMRTEX_DRAWS_VOLUME (AMRTEX_MODE == AMRTEX_MODE_DVR || AMRTEX_MODE == AMRTEX_MODE_DVR_ISO)
 
-// the same numbers as enum class Integrator (renderers/scene.hpp)
+// the same numbers as enum class Integrator (renderers/scene/scene.hpp)
 #define AMRTEX_INTEGRATOR_MIDPOINT 0
 #define AMRTEX_INTEGRATOR_EULER 1
 #define AMRTEX_INTEGRATOR_LEFT 2

@@ -19,7 +19,7 @@ ivec3 corner_of(IN(uvec4) words) { return ivec3(int(words.x), int(words.y), int(
 
 #if AMRTEX_CPP || AMRTEX_FILTER == AMRTEX_FILTER_BASIS
 #if AMRTEX_CPP || AMRTEX_BASIS_SEARCH
-BUFFER(uvec4, basis_supports, basis_supports_block)  // two a node: structures/hat_supports.hpp
+BUFFER(uvec4, basis_supports, basis_supports_block)  // two a node: structures/common/hat_supports.hpp
 #endif
 
 // A box of cells of one level.

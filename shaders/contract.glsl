@@ -48,7 +48,7 @@ DEFINE_INT(AMRTEX_FIELD_RANGES)
 DEFINE_INT(AMRTEX_SCALED_STORAGE)
 DEFINE_INT(AMRTEX_LEVEL_OF_DETAIL)
 
-// the same numbers as enum class Filter (asserted in renderers/cpu_field.cpp.in)
+// the same numbers as enum class Filter (asserted in renderers/cpu/cpu_field.cpp.in)
 #define AMRTEX_FILTER_NEAREST 0
 #define AMRTEX_FILTER_LINEAR_LOD 1
 #define AMRTEX_FILTER_LINEAR_PAGE 2
@@ -109,7 +109,7 @@ real decode_value(IN(real) code, IN(int) field) {
 }
 
 // A value range as encodings store it: distances of minimum and maximum from the field's
-// minimum, rounded outwards to the upper halves of floats (structures/build_tools.hpp).
+// minimum, rounded outwards to the upper halves of floats (structures/common/build_tools.hpp).
 vec2r decode_range(IN(uint) code) {
   return vec2r(u_range_origin + as_real(code << 16u), u_range_origin + as_real(code & 0xffff0000u));
 }

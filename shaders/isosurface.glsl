@@ -26,12 +26,12 @@ DEFINE_INT(AMRTEX_SHADING)
 DEFINE_INT(AMRTEX_SURFACE_POINTS)
 DEFINE_INT(AMRTEX_SURFACE_LOGARITHMIC)
 
-// the same numbers as enum class Output (renderers/scene.hpp)
+// the same numbers as enum class Output (renderers/scene/scene.hpp)
 #define AMRTEX_OUTPUT_COLOR 0
 #define AMRTEX_OUTPUT_DEPTH 1
 #define AMRTEX_OUTPUT_NORMAL 2
 
-// the same numbers as enum class Shading (renderers/scene.hpp)
+// the same numbers as enum class Shading (renderers/scene/scene.hpp)
 #define AMRTEX_SHADING_NONE 0
 #define AMRTEX_SHADING_GRADIENT 1
 #define AMRTEX_SHADING_CENTRAL 2
@@ -215,7 +215,7 @@ vec3r surface_normal(IN(Position) p, IN(real) isovalue) {
   return normalize(gradient / largest);
 }
 
-// Light that comes back from a surface: a lamp at the eye, both sides alike (surface_light in renderers/scene.hpp).
+// Light that comes back from a surface: a lamp at the eye, both sides alike (surface_light in renderers/scene/scene.hpp).
 real reflected_light(IN(Ray) ray, IN(vec3r) normal) {
   if (normal == vec3r(0)) return real(1);
   vec3r direction = vec3r(ray.direction) / vec3r(u_cells_per_unit);

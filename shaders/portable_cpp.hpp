@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "structures/error.hpp"
-#include "structures/host_texture.hpp"
+#include "structures/common/host_texture.hpp"
+#include "structures/mesh/error.hpp"
 
 #define AMRTEX_CPP 1
 #define AMRTEX_BELOW_ONE (real(1) - std::numeric_limits<real>::epsilon() / real(2))  // the largest real below 1

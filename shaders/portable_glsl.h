@@ -31,7 +31,7 @@
   layout(std430) readonly restrict buffer block { T name[]; };
 #define DEFINE_INT(name)
 
-// A set of textures of values that handles reach (structures/texture_handles.hpp). `handles` is a storage buffer.
+// A set of textures of values that handles reach (structures/common/texture_handles.hpp). `handles` is a storage buffer.
 #define VALUE_TEXTURE_SET(name, handles, block) BUFFER(uvec2, handles, block)
 #define SET_TEXEL(name, handle, texel) texelFetch(sampler3D(handle), texel, 0)
 #define SET_FILTERED(name, handle, uvw) textureLod(sampler3D(handle), uvw, 0.0)

@@ -2,7 +2,7 @@
 // Ray space: finest cells along each axis; lengths in units of the smallest edge of a
 // finest cell, so that with cubic cells one unit is one cell.
 UNIFORM(ray_vec3, u_eye)             // finest
-UNIFORM(ray_vec3, u_forward)         // units; see CameraFrame (renderers/scene.hpp)
+UNIFORM(ray_vec3, u_forward)         // units; see CameraFrame (renderers/scene/scene.hpp)
 UNIFORM(ray_vec3, u_right)           // units
 UNIFORM(ray_vec3, u_up)              // units
 UNIFORM(int, u_orthographic)

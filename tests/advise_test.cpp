@@ -1,5 +1,5 @@
 // Advice: the search against made-up costs whose best point is known, and on a small mesh for real.
-#include "bench/advise.hpp"
+#include "bench/measure/advise.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -10,8 +10,8 @@
 #include <cmath>
 #include <set>
 
-#include "bench/record.hpp"
-#include "structures/error.hpp"
+#include "bench/records/record.hpp"
+#include "structures/mesh/error.hpp"
 
 namespace amrtex {
 namespace {

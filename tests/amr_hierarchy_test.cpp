@@ -1,5 +1,5 @@
 // The mesh: which cells are leaves, what values coarser cells take, what is refused and how it is said.
-#include "structures/amr_hierarchy.hpp"
+#include "structures/mesh/amr_hierarchy.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <random>
 
-#include "structures/level_values.hpp"
-#include "structures/random_mesh.hpp"
-#include "structures/vertex_values.hpp"
+#include "structures/generators/random_mesh.hpp"
+#include "structures/mesh/level_values.hpp"
+#include "structures/mesh/vertex_values.hpp"
 #include "tests/test_meshes.hpp"
 
 namespace amrtex {

@@ -16,9 +16,9 @@
 #include <random>
 #include <sstream>
 
-#include "structures/amrex_fab.hpp"
-#include "structures/amrex_plotfile.hpp"
-#include "structures/mesh_io.hpp"
+#include "structures/readers/amrex_plotfile/amrex_fab.hpp"
+#include "structures/readers/amrex_plotfile/amrex_plotfile.hpp"
+#include "structures/readers/mesh_io.hpp"
 
 namespace amrtex {
 namespace {

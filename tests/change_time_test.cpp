@@ -1,10 +1,10 @@
 // A change of transfer function or isovalues: what is changed, what is uploaded, what is refused.
-#include "bench/change_time.hpp"
+#include "bench/measure/change_time.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "structures/synthetic.hpp"
+#include "structures/generators/synthetic.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {

@@ -2,8 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "renderers/box_consumer.hpp"
-#include "renderers/scene_bindings.hpp"
+#include "renderers/consumers/box_consumer.hpp"
+#include "renderers/scene/scene_bindings.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {

@@ -13,11 +13,11 @@
 #include <filesystem>
 #include <fstream>
 
-#include "bench/image_error.hpp"
-#include "bench/record.hpp"
-#include "renderers/picture.hpp"
-#include "structures/amrex_plotfile.hpp"
-#include "structures/synthetic.hpp"
+#include "bench/measure/image_error.hpp"
+#include "bench/records/record.hpp"
+#include "renderers/scene/picture.hpp"
+#include "structures/generators/synthetic.hpp"
+#include "structures/readers/amrex_plotfile/amrex_plotfile.hpp"
 
 extern char** environ;
 

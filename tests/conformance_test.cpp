@@ -5,8 +5,8 @@
 
 #include <set>
 
-#include "renderers/raycaster.hpp"
-#include "renderers/scene_bindings.hpp"
+#include "renderers/consumers/raycaster.hpp"
+#include "renderers/scene/scene_bindings.hpp"
 #include "shaders/shader_library.hpp"
 #include "tests/pictures.hpp"
 

@@ -3,8 +3,8 @@
 
 #include <set>
 
-#include "renderers/screen_polygons.hpp"
-#include "structures/random_mesh.hpp"
+#include "renderers/consumers/screen_polygons.hpp"
+#include "structures/generators/random_mesh.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {

@@ -1,5 +1,5 @@
 // Contexts, programs and uploads on every kind of context that this machine has.
-#include "renderers/context.hpp"
+#include "renderers/context/context.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -8,12 +8,12 @@
 #include <cstring>
 #include <numeric>
 
-#include "renderers/context_probe.hpp"
-#include "renderers/draw_target.hpp"
-#include "renderers/gpu_field.hpp"
-#include "renderers/gpu_timer.hpp"
-#include "renderers/program.hpp"
-#include "structures/error.hpp"
+#include "renderers/context/context_probe.hpp"
+#include "renderers/context/gpu_timer.hpp"
+#include "renderers/gpu/draw_target.hpp"
+#include "renderers/gpu/gpu_field.hpp"
+#include "renderers/gpu/program.hpp"
+#include "structures/mesh/error.hpp"
 
 namespace amrtex {
 namespace {

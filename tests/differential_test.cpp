@@ -7,7 +7,7 @@
 #include <map>
 #include <set>
 
-#include "structures/random_mesh.hpp"
+#include "structures/generators/random_mesh.hpp"
 #include "tests/encoding_cases.hpp"
 
 namespace amrtex {

@@ -9,7 +9,7 @@
 
 #include "bench/verify/encoding_cases.hpp"
 #include "bench/verify/probing.hpp"
-#include "renderers/context.hpp"
+#include "renderers/context/context.hpp"
 #include "tests/test_meshes.hpp"
 
 namespace amrtex::test {

@@ -1,11 +1,11 @@
-#include "bench/environment.hpp"
+#include "bench/measure/environment.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstdlib>
 
-#include "bench/record.hpp"
+#include "bench/records/record.hpp"
 
 namespace amrtex {
 namespace {

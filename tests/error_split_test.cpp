@@ -1,9 +1,9 @@
 // The error by cause: each cause where it can be said in advance what it must do, and nothing where it is absent.
-#include "bench/error_split.hpp"
+#include "bench/measure/error_split.hpp"
 
 #include <gtest/gtest.h>
 
-#include "renderers/sampled_reference.hpp"
+#include "renderers/cpu/sampled_reference.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {

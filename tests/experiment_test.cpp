@@ -1,4 +1,4 @@
-#include "bench/experiment.hpp"
+#include "bench/settings/experiment.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -9,11 +9,11 @@
 #include <fstream>
 #include <set>
 
-#include "bench/json_file.hpp"
-#include "bench/record.hpp"
-#include "bench/runner.hpp"
-#include "renderers/triangle_mesh.hpp"
-#include "structures/error.hpp"
+#include "bench/measure/runner.hpp"
+#include "bench/records/record.hpp"
+#include "bench/settings/json_file.hpp"
+#include "renderers/scene/triangle_mesh.hpp"
+#include "structures/mesh/error.hpp"
 
 namespace amrtex {
 namespace {

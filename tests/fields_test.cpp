@@ -2,10 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "renderers/box_consumer.hpp"
-#include "renderers/consumer.hpp"
-#include "renderers/sampled_reference.hpp"
-#include "renderers/scene_bindings.hpp"
+#include "renderers/consumers/box_consumer.hpp"
+#include "renderers/consumers/consumer.hpp"
+#include "renderers/cpu/sampled_reference.hpp"
+#include "renderers/scene/scene_bindings.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {

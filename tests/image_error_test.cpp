@@ -1,4 +1,4 @@
-#include "bench/image_error.hpp"
+#include "bench/measure/image_error.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <limits>
 #include <map>
 
-#include "structures/error.hpp"
+#include "structures/mesh/error.hpp"
 
 namespace amrtex {
 namespace {

@@ -5,8 +5,8 @@
 #include <array>
 #include <map>
 
-#include "bench/image_error.hpp"
-#include "structures/synthetic.hpp"
+#include "bench/measure/image_error.hpp"
+#include "structures/generators/synthetic.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {

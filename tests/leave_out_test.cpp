@@ -9,10 +9,10 @@
 #include <set>
 #include <thread>
 
-#include "bench/left_out_time.hpp"
-#include "bench/record.hpp"
-#include "bench/runner.hpp"
-#include "structures/build_tools.hpp"
+#include "bench/measure/left_out_time.hpp"
+#include "bench/measure/runner.hpp"
+#include "bench/records/record.hpp"
+#include "structures/common/build_tools.hpp"
 #include "structures/kd_tree/kd_tree_layout.h"
 #include "tests/pictures.hpp"
 

@@ -6,13 +6,13 @@
 #include <filesystem>
 #include <functional>
 
-#include "bench/record.hpp"
-#include "bench/runner.hpp"
-#include "renderers/cpu_field.hpp"
-#include "renderers/program.hpp"
-#include "renderers/scene_bindings.hpp"
+#include "bench/measure/runner.hpp"
+#include "bench/records/record.hpp"
+#include "renderers/cpu/cpu_field.hpp"
+#include "renderers/gpu/program.hpp"
+#include "renderers/scene/scene_bindings.hpp"
 #include "shaders/shader_library.hpp"
-#include "structures/random_mesh.hpp"
+#include "structures/generators/random_mesh.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {

@@ -4,9 +4,9 @@
 
 #include <fstream>
 
-#include "renderers/probe.hpp"
-#include "renderers/raycaster.hpp"
-#include "structures/mesh_io.hpp"
+#include "renderers/consumers/probe.hpp"
+#include "renderers/consumers/raycaster.hpp"
+#include "structures/readers/mesh_io.hpp"
 
 namespace amrtex {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <map>
 
-#include "renderers/box_consumer.hpp"
-#include "renderers/scene_bindings.hpp"
+#include "renderers/consumers/box_consumer.hpp"
+#include "renderers/scene/scene_bindings.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {

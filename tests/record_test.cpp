@@ -1,4 +1,4 @@
-#include "bench/record.hpp"
+#include "bench/records/record.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <fstream>
 #include <set>
 
-#include "structures/error.hpp"
+#include "structures/mesh/error.hpp"
 
 namespace amrtex {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "renderers/hierarchy_reference.hpp"
+#include "renderers/reference/hierarchy_reference.hpp"
 #include "test_meshes.hpp"
 
 namespace amrtex {

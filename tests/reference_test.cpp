@@ -12,12 +12,12 @@
 #include <numbers>
 #include <random>
 
-#include "renderers/hierarchy_reference.hpp"
-#include "renderers/reference_field.hpp"
-#include "renderers/reference_tracer.hpp"
-#include "structures/level_values.hpp"
-#include "structures/mesh_io.hpp"
-#include "structures/random_mesh.hpp"
+#include "renderers/reference/hierarchy_reference.hpp"
+#include "renderers/reference/reference_field.hpp"
+#include "renderers/reference/reference_tracer.hpp"
+#include "structures/generators/random_mesh.hpp"
+#include "structures/mesh/level_values.hpp"
+#include "structures/readers/mesh_io.hpp"
 
 namespace amrtex {
 namespace {

@@ -1,4 +1,4 @@
-#include "bench/report.hpp"
+#include "bench/report/report.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,9 +8,9 @@
 #include <filesystem>
 #include <fstream>
 
-#include "bench/paper_tables.hpp"
-#include "bench/record.hpp"
-#include "structures/error.hpp"
+#include "bench/records/record.hpp"
+#include "bench/report/paper_tables.hpp"
+#include "structures/mesh/error.hpp"
 
 namespace amrtex {
 namespace {

@@ -1,12 +1,12 @@
 // Tables and diagrams of one quantity against others, from made-up records whose line is known.
-#include "bench/scatter.hpp"
+#include "bench/report/scatter.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "bench/record.hpp"
-#include "structures/error.hpp"
+#include "bench/records/record.hpp"
+#include "structures/mesh/error.hpp"
 #include "tests/table_files.hpp"
 
 namespace amrtex {

@@ -1,5 +1,5 @@
 // Views, transfer functions, their JSON, and float pictures.
-#include "renderers/scene.hpp"
+#include "renderers/scene/scene.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <fstream>
 #include <limits>
 
-#include "renderers/picture.hpp"
+#include "renderers/scene/picture.hpp"
 
 namespace amrtex {
 namespace {

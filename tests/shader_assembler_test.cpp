@@ -1,6 +1,6 @@
 // The text of a shader: order, includes, line numbers, hash. No GL here; that drivers
 // agree with the line numbers is in context_test.cpp.
-#include "renderers/shader_assembler.hpp"
+#include "renderers/gpu/shader_assembler.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <cstdlib>
 
 #include "shaders/shader_library.hpp"
-#include "structures/error.hpp"
+#include "structures/mesh/error.hpp"
 
 namespace amrtex {
 namespace {

@@ -1,4 +1,4 @@
-#include "bench/statistics.hpp"
+#include "bench/measure/statistics.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <numeric>
 #include <random>
 
-#include "structures/error.hpp"
+#include "structures/mesh/error.hpp"
 
 namespace amrtex {
 namespace {

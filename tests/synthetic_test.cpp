@@ -1,5 +1,5 @@
 // Generated meshes against the analytic truth, and the rules that they promise to keep.
-#include "structures/synthetic.hpp"
+#include "structures/generators/synthetic.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -13,8 +13,8 @@
 #include <set>
 #include <utility>
 
-#include "structures/cluster_blocks.hpp"
-#include "structures/random_mesh.hpp"
+#include "structures/generators/cluster_blocks.hpp"
+#include "structures/generators/random_mesh.hpp"
 
 namespace amrtex {
 namespace {

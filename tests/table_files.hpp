@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "bench/table.hpp"
-#include "structures/error.hpp"
+#include "bench/report/table.hpp"
+#include "structures/mesh/error.hpp"
 
 namespace amrtex::test {
 

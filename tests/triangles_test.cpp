@@ -10,11 +10,11 @@
 #include <random>
 #include <set>
 
-#include "renderers/box_consumer.hpp"
-#include "renderers/hierarchy_reference.hpp"
-#include "renderers/scene_bindings.hpp"
-#include "renderers/triangle_layer.hpp"
-#include "renderers/triangle_reader.hpp"
+#include "renderers/consumers/box_consumer.hpp"
+#include "renderers/consumers/triangle_layer.hpp"
+#include "renderers/reference/hierarchy_reference.hpp"
+#include "renderers/scene/scene_bindings.hpp"
+#include "renderers/scene/triangle_reader.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {

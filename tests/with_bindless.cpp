@@ -7,8 +7,8 @@
 #include <cerrno>
 #include <cstring>
 
-#include "renderers/context_probe.hpp"
-#include "structures/texture_handles.hpp"
+#include "renderers/context/context_probe.hpp"
+#include "structures/common/texture_handles.hpp"
 
 namespace {
 

@@ -1,13 +1,13 @@
 // Tables and diagrams of work-precision from made-up records whose answer can be seen.
-#include "bench/work_precision.hpp"
+#include "bench/report/work_precision.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "bench/pareto.hpp"
-#include "bench/record.hpp"
-#include "structures/error.hpp"
+#include "bench/records/record.hpp"
+#include "bench/report/pareto.hpp"
+#include "structures/mesh/error.hpp"
 #include "tests/table_files.hpp"
 
 namespace amrtex {

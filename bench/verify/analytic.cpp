@@ -4,7 +4,7 @@
 #include "bench/verify/pictures.hpp"
 #include "bench/verify/probing.hpp"
 #include "bench/verify/verify.hpp"
-#include "structures/build_tools.hpp"
+#include "structures/common/build_tools.hpp"
 
 namespace amrtex::verify {
 namespace {

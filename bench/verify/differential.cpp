@@ -7,10 +7,10 @@
 #include "bench/verify/pictures.hpp"
 #include "bench/verify/probing.hpp"
 #include "bench/verify/verify.hpp"
-#include "renderers/consumer.hpp"
-#include "structures/amrex_plotfile.hpp"
-#include "structures/mesh_io.hpp"
-#include "structures/random_mesh.hpp"
+#include "renderers/consumers/consumer.hpp"
+#include "structures/generators/random_mesh.hpp"
+#include "structures/readers/amrex_plotfile/amrex_plotfile.hpp"
+#include "structures/readers/mesh_io.hpp"
 
 namespace amrtex::verify {
 namespace {

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "bench/verify/meshes.hpp"
-#include "structures/encoding.hpp"
+#include "structures/common/encoding.hpp"
 
 namespace amrtex::verify {
 

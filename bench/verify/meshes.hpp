@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "structures/amr_hierarchy.hpp"
+#include "structures/mesh/amr_hierarchy.hpp"
 
 namespace amrtex::verify {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "bench/verify/meshes.hpp"
-#include "renderers/raycaster.hpp"
+#include "renderers/consumers/raycaster.hpp"
 
 namespace amrtex::verify {
 

@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "bench/verify/meshes.hpp"
-#include "renderers/hierarchy_reference.hpp"
-#include "renderers/probe.hpp"
-#include "structures/level_values.hpp"
+#include "renderers/consumers/probe.hpp"
+#include "renderers/reference/hierarchy_reference.hpp"
+#include "structures/mesh/level_values.hpp"
 
 namespace amrtex::verify {
 

@@ -1,7 +1,7 @@
 // Extinction from nothing to infinity, transfer functions with steps and spikes, shells thinner than a cell.
 #include "bench/verify/pictures.hpp"
 #include "bench/verify/verify.hpp"
-#include "renderers/hierarchy_reference.hpp"
+#include "renderers/reference/hierarchy_reference.hpp"
 
 namespace amrtex::verify {
 namespace {

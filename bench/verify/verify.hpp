@@ -10,9 +10,9 @@
 #include <variant>
 #include <vector>
 
-#include "bench/table.hpp"
+#include "bench/report/table.hpp"
 #include "bench/verify/encoding_cases.hpp"
-#include "renderers/context.hpp"
+#include "renderers/context/context.hpp"
 
 namespace amrtex::verify {
 

@@ -9,8 +9,8 @@
 #include <memory>
 #include <vector>
 
-#include "structures/amr_hierarchy.hpp"
-#include "structures/hat_supports.hpp"
+#include "structures/common/hat_supports.hpp"
+#include "structures/mesh/amr_hierarchy.hpp"
 
 namespace amrtex::exa {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "structures/spaces.hpp"
+#include "structures/mesh/spaces.hpp"
 
 namespace amrtex::exa {
 

@@ -12,10 +12,10 @@
 #include "bvh.hpp"
 #include "exabricks_layout.h"
 #include "regions.hpp"
-#include "structures/brick_packing.hpp"
-#include "structures/build_tools.hpp"
+#include "structures/common/brick_packing.hpp"
+#include "structures/common/build_tools.hpp"
 #include "structures/kd_tree/start_grid.hpp"
-#include "structures/level_values.hpp"
+#include "structures/mesh/level_values.hpp"
 
 namespace amrtex {
 namespace {

@@ -7,14 +7,14 @@
 
 #include <set>
 
-#include "renderers/hierarchy_reference.hpp"
-#include "renderers/raycaster.hpp"
-#include "renderers/reference_point.hpp"
+#include "renderers/consumers/raycaster.hpp"
+#include "renderers/reference/hierarchy_reference.hpp"
+#include "renderers/reference/reference_point.hpp"
 #include "structures/exabricks/bricks.hpp"
 #include "structures/exabricks/bvh.hpp"
 #include "structures/exabricks/regions.hpp"
-#include "structures/random_mesh.hpp"
-#include "structures/synthetic.hpp"
+#include "structures/generators/random_mesh.hpp"
+#include "structures/generators/synthetic.hpp"
 #include "tests/encoding_cases.hpp"
 #include "tests/pictures.hpp"
 

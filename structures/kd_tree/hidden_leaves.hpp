@@ -9,9 +9,9 @@
 
 #include "kd_hats.hpp"
 #include "kd_partition.hpp"
-#include "structures/build_tools.hpp"
-#include "structures/level_values.hpp"
-#include "structures/vertex_values.hpp"
+#include "structures/common/build_tools.hpp"
+#include "structures/mesh/level_values.hpp"
+#include "structures/mesh/vertex_values.hpp"
 
 namespace amrtex::kd {
 

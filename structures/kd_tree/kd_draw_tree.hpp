@@ -2,7 +2,7 @@
 #pragma once
 
 #include "start_grid.hpp"
-#include "structures/draw_tree.hpp"
+#include "structures/common/draw_tree.hpp"
 
 namespace amrtex::kd {
 

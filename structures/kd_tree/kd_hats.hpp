@@ -9,8 +9,8 @@
 
 #include "kd_partition.hpp"
 #include "start_grid.hpp"
-#include "structures/hat_supports.hpp"
-#include "structures/level_values.hpp"
+#include "structures/common/hat_supports.hpp"
+#include "structures/mesh/level_values.hpp"
 
 namespace amrtex::kd {
 

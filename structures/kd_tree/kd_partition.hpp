@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "kd_tree_layout.h"
-#include "structures/amr_hierarchy.hpp"
+#include "structures/mesh/amr_hierarchy.hpp"
 
 namespace amrtex::kd {
 

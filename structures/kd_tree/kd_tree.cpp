@@ -14,11 +14,11 @@
 #include "kd_hats.hpp"
 #include "kd_partition.hpp"
 #include "start_grid.hpp"
-#include "structures/brick_packing.hpp"
-#include "structures/build_tools.hpp"
-#include "structures/level_values.hpp"
-#include "structures/texture_handles.hpp"
-#include "structures/vertex_values.hpp"
+#include "structures/common/brick_packing.hpp"
+#include "structures/common/build_tools.hpp"
+#include "structures/common/texture_handles.hpp"
+#include "structures/mesh/level_values.hpp"
+#include "structures/mesh/vertex_values.hpp"
 
 namespace amrtex {
 namespace {

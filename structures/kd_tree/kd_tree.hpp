@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "structures/encoding.hpp"
+#include "structures/common/encoding.hpp"
 
 namespace amrtex {
 

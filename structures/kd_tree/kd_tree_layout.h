@@ -11,8 +11,8 @@
 //   the node's lower corner. The first child is the one below the plane.
 //
 // A data node, AMRTEX_KD_DATA_WORDS words: where the texel of the node's lower cell (or vertex) lies in the pool or its
-// brick, x in the lowest bits, then y and z; then the number of its brick (bindless); then its coded value range, where regions are skipped; then its first word of validity
-// bits, where cells may have no value.
+// brick, x in the lowest bits, then y and z; then the number of its brick (bindless); then its coded value range, where regions
+// are skipped; then its first word of validity bits, where cells may have no value.
 //
 // With a level of detail, a node's data nodes stand one behind the other, the coarsest first: cells that are refined and
 // may be drawn in place of what lies below, then a leaf's own. Each has a word in kd_detail:
@@ -20,7 +20,8 @@
 //   13        12          6 5       0
 //   [ last    ][ next     ][ level   ]   next: the coarsest level that takes the cells' place; 2^6: none. last: of the node
 //
-// A leaf of basis_supports (filter basis) tells its data node in the lower AMRTEX_KD_DATA_BITS bits and its level above them, plus 1.
+// A leaf of basis_supports (filter basis) tells its data node in the lower AMRTEX_KD_DATA_BITS bits and its level above them,
+// plus 1.
 #define AMRTEX_KD_DETAIL_LAST_BIT 13
 #define AMRTEX_KD_CHILD_BITS 24
 #define AMRTEX_KD_LEVEL_BITS 6

@@ -9,16 +9,16 @@
 #include <chrono>
 #include <cmath>
 
-#include "renderers/raycaster.hpp"
-#include "structures/brick_packing.hpp"
-#include "structures/build_tools.hpp"
+#include "renderers/consumers/raycaster.hpp"
+#include "structures/common/brick_packing.hpp"
+#include "structures/common/build_tools.hpp"
+#include "structures/common/texture_handles.hpp"
+#include "structures/generators/random_mesh.hpp"
+#include "structures/generators/synthetic.hpp"
 #include "structures/kd_tree/kd_detail.hpp"
 #include "structures/kd_tree/kd_hats.hpp"
 #include "structures/kd_tree/kd_partition.hpp"
 #include "structures/kd_tree/start_grid.hpp"
-#include "structures/random_mesh.hpp"
-#include "structures/synthetic.hpp"
-#include "structures/texture_handles.hpp"
 #include "tests/encoding_cases.hpp"
 #include "tests/pictures.hpp"
 

@@ -13,7 +13,7 @@
 #include "octree_layout.h"
 #include "octree_mesh.hpp"
 #include "octree_windows.hpp"
-#include "structures/build_tools.hpp"
+#include "structures/common/build_tools.hpp"
 
 namespace amrtex {
 namespace {

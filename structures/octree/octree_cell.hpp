@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "structures/spaces.hpp"
+#include "structures/mesh/spaces.hpp"
 
 namespace amrtex {
 

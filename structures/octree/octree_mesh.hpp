@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "octree_cell.hpp"
-#include "structures/amr_hierarchy.hpp"
-#include "structures/level_values.hpp"
+#include "structures/mesh/amr_hierarchy.hpp"
+#include "structures/mesh/level_values.hpp"
 #include "visible_parts.hpp"
 
 namespace amrtex {

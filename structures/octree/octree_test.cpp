@@ -6,12 +6,12 @@
 
 #include <bit>
 
-#include "renderers/raycaster.hpp"
-#include "renderers/scene_bindings.hpp"
+#include "renderers/consumers/raycaster.hpp"
+#include "renderers/scene/scene_bindings.hpp"
 #include "shaders/shader_library.hpp"
+#include "structures/generators/random_mesh.hpp"
+#include "structures/generators/synthetic.hpp"
 #include "structures/octree/octree_layout.h"
-#include "structures/random_mesh.hpp"
-#include "structures/synthetic.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {

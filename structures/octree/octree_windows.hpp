@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "structures/amr_hierarchy.hpp"
-#include "structures/build_tools.hpp"
-#include "structures/level_values.hpp"
+#include "structures/common/build_tools.hpp"
+#include "structures/mesh/amr_hierarchy.hpp"
+#include "structures/mesh/level_values.hpp"
 
 namespace amrtex {
 

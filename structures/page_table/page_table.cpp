@@ -11,9 +11,9 @@
 #include <set>
 
 #include "page_table_layout.h"
-#include "structures/build_tools.hpp"
-#include "structures/level_values.hpp"
-#include "structures/vertex_values.hpp"
+#include "structures/common/build_tools.hpp"
+#include "structures/mesh/level_values.hpp"
+#include "structures/mesh/vertex_values.hpp"
 
 namespace amrtex {
 namespace {
@@ -340,8 +340,11 @@ class PageTable final : public Encoding {
   std::span<const Filter> filters() const override { return kFilters; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"page_size", "cells along the edge of a page", 16, "4, 8, 16, 32, 64 or 128", {4, 8, 16, 32, 64}},
-            {"centring", "what a texel of a page is: a cell, or a vertex (then the filter is linear_vertex)", "cell",
-             "\"cell\" or \"node\"", {"cell", "node"}}};
+            {"centring",
+             "what a texel of a page is: a cell, or a vertex (then the filter is linear_vertex)",
+             "cell",
+             "\"cell\" or \"node\"",
+             {"cell", "node"}}};
   }
   void check_parameters(const Json& parameters) const override { values(parameters); }
   Support supported(const ContextInfo&) const override { return {}; }

@@ -6,7 +6,7 @@
 //   red    31  30 29     24 23                0
 //          [kind ][ level  ][ index            ]   of the page in the pool, or of the sub-table
 //   green  page: its coded value range | constant: the value as float bits
-#define AMRTEX_PAGE_ABSENT 0    // no mesh here: neither page nor value
+#define AMRTEX_PAGE_ABSENT 0  // no mesh here: neither page nor value
 #define AMRTEX_PAGE_STORED 1
 #define AMRTEX_PAGE_CONSTANT 2  // all cells and their border have one value
 #define AMRTEX_PAGE_SUBTABLE 3  // look on in the second level of the table

@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "structures/generators/synthetic.hpp"
 #include "structures/page_table/page_table_layout.h"
-#include "structures/synthetic.hpp"
 #include "tests/encoding_cases.hpp"
 
 namespace amrtex {

@@ -7,9 +7,9 @@
 #include <array>
 #include <cmath>
 
-#include "structures/build_tools.hpp"
-#include "structures/level_values.hpp"
-#include "structures/vertex_values.hpp"
+#include "structures/common/build_tools.hpp"
+#include "structures/mesh/level_values.hpp"
+#include "structures/mesh/vertex_values.hpp"
 #include "uniform_layout.h"
 
 namespace amrtex {

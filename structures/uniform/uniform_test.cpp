@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "structures/build_tools.hpp"
+#include "structures/common/build_tools.hpp"
 #include "structures/uniform/uniform_layout.h"
 #include "tests/encoding_cases.hpp"
 

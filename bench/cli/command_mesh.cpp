@@ -1,0 +1,131 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "bench/cli/commands.hpp"
+#include "bench/settings/json_file.hpp"
+#include "structures/common/encoding.hpp"
+#include "structures/generators/synthetic.hpp"
+#include "structures/readers/amrex_plotfile/amrex_plotfile.hpp"
+#include "structures/readers/mesh_io.hpp"
+
+namespace amrtex {
+namespace {
+
+namespace fs = std::filesystem;
+
+Json info_json(const AmrHierarchy& mesh) {
+  Json json;
+  json["name"] = mesh.name();
+  for (int l = 0; l < mesh.level_count(); ++l)
+    json["levels"].push_back({{"level", l},
+                              {"patches", mesh.patches(l).size()},
+                              {"cells", mesh.stored_cells(l)},
+                              {"leaf_cells", mesh.leaf_cells(l)},
+                              {"ratio_to_finer", mesh.ratio_to_finer(l)}});
+  json["leaf_cells"] = mesh.leaf_cells();
+  const Vec3d lower = mesh.domain_lower();
+  const Vec3d upper = mesh.domain_upper();
+  const Vec3i finest = mesh.cells(mesh.finest_level());
+  json["domain"] = {{"lower", {lower.x, lower.y, lower.z}}, {"upper", {upper.x, upper.y, upper.z}}};
+  json["finest_cells"] = {finest.x, finest.y, finest.z};
+  json["holes"] = mesh.has_holes();
+  json["periodic"] = mesh.periodic();
+  for (std::size_t f = 0; f < mesh.fields().size(); ++f) {
+    const FieldStatistics& s = mesh.statistics(static_cast<int>(f));
+    json["fields"].push_back({{"name", mesh.fields()[f]},
+                              {"min", s.min},
+                              {"max", s.max},
+                              {"volume_integral", s.volume_integral},
+                              {"cells_without_value", s.cells_without_value},
+                              {"hash", mesh.content_hash(static_cast<int>(f))}});
+  }
+  json["hash"] = mesh.content_hash(0);
+  return json;
+}
+
+void print_info(const AmrHierarchy& mesh) {
+  const Json json = info_json(mesh);
+  const Vec3d lower = mesh.domain_lower();
+  const Vec3d upper = mesh.domain_upper();
+  fmt::print("{}\n  domain      [{:g}, {:g}] x [{:g}, {:g}] x [{:g}, {:g}]\n", mesh.name(), lower.x, upper.x, lower.y, upper.y,
+             lower.z, upper.z);
+  fmt::print("  leaf cells  {}{}\n", mesh.leaf_cells(), mesh.has_holes() ? " (the mesh has holes)" : "");
+  fmt::print("  hash        {}\n\n  level  patches       cells  leaf cells  ratio to finer\n", json["hash"].get<std::string>());
+  for (int l = 0; l < mesh.level_count(); ++l)
+    fmt::print("  {:5}  {:7}  {:10}  {:10}  {}\n", l, mesh.patches(l).size(), mesh.stored_cells(l), mesh.leaf_cells(l),
+               l == mesh.finest_level() ? "-" : std::to_string(mesh.ratio_to_finer(l)));
+  fmt::print("\n  field                min            max  volume integral\n");
+  for (std::size_t f = 0; f < mesh.fields().size(); ++f) {
+    const FieldStatistics& s = mesh.statistics(static_cast<int>(f));
+    fmt::print("  {:12} {:12.6g} {:14.6g} {:16.9g}\n", mesh.fields()[f], s.min, s.max, s.volume_integral);
+    if (s.cells_without_value > 0)
+      fmt::print("    {} leaf cells have no value (NaN or infinite); they are not drawn\n", s.cells_without_value);
+  }
+  for (bool p : mesh.periodic())
+    if (p) {
+      fmt::print("\n  periodic domain: drawn clamped at its faces\n");
+      break;
+    }
+}
+
+}  // namespace
+
+Json read_json_argument(const std::string& text, const char* what) {
+  if (!text.empty() && text.front() == '{') return JsonFile(text, what).root().json();
+  if (!fs::is_regular_file(text))
+    throw UsageError(fmt::format("{}: no such file; accepted: a JSON file, or the JSON itself in quotes", text));
+  return JsonFile::read(text).root().json();
+}
+
+void add_mesh_commands(CLI::App& app, Command& chosen) {
+  struct Arguments {
+    std::string input, output, field;
+    bool json = false;
+  };
+  auto a = std::make_shared<Arguments>();
+
+  CLI::App* info = app.add_subcommand("info", "levels, patches, cells, fields, ranges and hash of a data set");
+  info->add_option("data", a->input, "data set: an AMReX plotfile")->required();
+  info->add_option("--field", a->field, "only this field is read");
+  info->add_flag("--json", a->json, "for programs");
+  info->footer("Example: amrtex info data/amrex_tiny/plt00008");
+  info->callback([a, &chosen] {
+    chosen = [a] {
+      const AmrHierarchy mesh(read_mesh(a->input, a->field.empty() ? std::vector<std::string>() : std::vector{a->field}));
+      if (a->json)
+        fmt::print("{}\n", info_json(mesh).dump(2));
+      else
+        print_info(mesh);
+      return 0;
+    };
+  });
+
+  CLI::App* generate = app.add_subcommand("generate", "a synthetic mesh over an analytic field, as an AMReX plotfile");
+  generate->add_option("spec", a->input, "JSON file, or the JSON itself (docs/generate.md)")->required();
+  generate->add_option("-o,--out", a->output, "folder to write; must not exist")->required();
+  generate->footer("Example: amrtex generate '{\"field\": \"shell\", \"levels\": 3}' -o out/shell");
+  generate->callback([a, &chosen] {
+    chosen = [a] {
+      write_amrex_plotfile(AmrHierarchy(generate_mesh(read_json_argument(a->input, "specification"))), a->output);
+      return 0;
+    };
+  });
+
+  CLI::App* convert = app.add_subcommand("convert", "a data set of any readable format, as an AMReX plotfile");
+  convert->add_option("in", a->input, "data set")->required();
+  convert->add_option("out", a->output, "folder to write; must not exist")->required();
+  convert->add_option("--field", a->field, "only this field");
+  convert->footer(
+      "Example: amrtex convert data/amrex_tiny/plt00008 out/copy\nValues under finer patches become the means of what covers "
+      "them.");
+  convert->callback([a, &chosen] {
+    chosen = [a] {
+      write_amrex_plotfile(
+          AmrHierarchy(read_mesh(a->input, a->field.empty() ? std::vector<std::string>() : std::vector{a->field})), a->output);
+      return 0;
+    };
+  });
+}
+
+}  // namespace amrtex

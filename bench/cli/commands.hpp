@@ -1,0 +1,32 @@
+// The subcommands of `amrtex`. Each adds itself to the parser; the chosen one runs and
+// returns an exit code (0 ok, 1 the work failed). Exceptions are told in main.cpp.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "structures/common/encoding.hpp"
+
+namespace amrtex {
+
+using Command = std::function<int()>;
+
+/// Each sets `chosen` when its subcommand was given.
+void add_mesh_commands(CLI::App& app, Command& chosen);     // info, generate, convert
+void add_context_commands(CLI::App& app, Command& chosen);  // encodings, doctor
+void add_sample_command(CLI::App& app, Command& chosen);
+void add_render_command(CLI::App& app, Command& chosen);
+void add_run_commands(CLI::App& app, Command& chosen);  // run, report
+void add_verify_command(CLI::App& app, Command& chosen);
+void add_advise_command(CLI::App& app, Command& chosen);
+
+/// "512MiB", "2GiB", "1000000". Throws UsageError.
+std::int64_t parse_bytes(const std::string& text);
+/// A JSON file, or the JSON itself. Throws UsageError naming the file, or `what` for JSON without one, and the line.
+Json read_json_argument(const std::string& text, const char* what);
+/// Throws UnsupportedError with the encoding's reason where this context cannot hold it.
+void require_support(const Encoding& encoding, const ContextInfo& context);
+
+}  // namespace amrtex

@@ -1,0 +1,78 @@
+// amrtex: the command line. Exit codes: 0 ok, 1 the work failed, 2 bad usage.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <new>
+
+#include "bench/cli/commands.hpp"
+#include "structures/mesh/error.hpp"
+
+namespace {
+
+using Names = std::vector<std::string>;
+
+Names commands_of(const CLI::App& app) {
+  Names names;
+  for (const CLI::App* c : app.get_subcommands([](const CLI::App*) { return true; })) names.push_back(c->get_name());
+  return names;
+}
+
+Names options_of(const CLI::App& command) {
+  Names names;
+  for (const CLI::Option* o : command.get_options()) names.push_back(o->get_name());
+  return names;
+}
+
+/// One line: what is wrong with the command line and what is accepted there.
+std::string complaint(const CLI::App& app, const CLI::ParseError& error) {
+  const Names rest = app.remaining(true);
+  const auto given = app.get_subcommands();
+  if (given.empty())
+    return fmt::format("{}; accepted: {}", rest.empty() ? "no command given" : fmt::format("no command '{}'", rest.front()),
+                       fmt::join(commands_of(app), ", "));
+  const CLI::App& command = *given.front();
+  if (!rest.empty())
+    return fmt::format("{}: '{}' was not expected; accepted: {}", command.get_name(), rest.front(),
+                       fmt::join(options_of(command), ", "));
+  std::string text = error.what();
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return fmt::format("{0}: {1}; see `amrtex {0} --help`", command.get_name(), text);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"amrtex: GPU encodings of AMR data, compared by memory, frame time and image error"};
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "amrtex 0.1.0");
+  app.footer("Example: amrtex run experiments/quickstart/experiment.json --out out/quickstart");
+  amrtex::Command chosen;
+  amrtex::add_context_commands(app, chosen);
+  amrtex::add_mesh_commands(app, chosen);
+  amrtex::add_sample_command(app, chosen);
+  amrtex::add_render_command(app, chosen);
+  amrtex::add_run_commands(app, chosen);
+  amrtex::add_verify_command(app, chosen);
+  amrtex::add_advise_command(app, chosen);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    fmt::print(stderr, "amrtex: {}\n", complaint(app, error));
+    return 2;
+  }
+  try {
+    return chosen();
+  } catch (const amrtex::UsageError& error) {
+    fmt::print(stderr, "amrtex: {}\n", error.what());
+    return 2;
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr, "amrtex: this machine has not enough memory for it\n");
+    return 1;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "amrtex: {}\n", error.what());
+    return 1;
+  }
+}

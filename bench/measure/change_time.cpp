@@ -1,0 +1,81 @@
+#include "bench/measure/change_time.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "renderers/consumers/consumer.hpp"
+#include "structures/mesh/error.hpp"
+
+namespace amrtex {
+namespace {
+
+constexpr double kPart = 0.01;
+
+/// Added to values, or to their logarithm.
+void move_points(TransferFunction& tf) {
+  if (tf.extinction.empty()) return;
+  const double step = kPart * (tf.axis(tf.extinction.back().value) - tf.axis(tf.extinction.front().value));
+  const auto moved = [&](double value) { return tf.logarithmic ? value * std::pow(10.0, step) : value + step; };
+  for (auto& point : tf.extinction) point.value = moved(point.value);
+  for (auto& point : tf.color) point.value = moved(point.value);
+}
+
+void move_isovalues(std::vector<double>& values) {
+  if (values.empty()) return;
+  const double span = values.size() > 1 ? values.back() - values.front() : std::abs(values.front());
+  for (double& value : values) value += kPart * (span > 0 ? span : 1);
+}
+
+/// The numbers of one uniform, and whether it is among `others` with the same ones.
+std::int64_t bytes_of_difference(const UniformValue& value, const UniformValues& others) {
+  const auto same = std::any_of(others.begin(), others.end(), [&](const UniformValue& other) {
+    return other.name == value.name && other.numbers == value.numbers;
+  });
+  if (same) return 0;
+  return 4 * std::visit([](const auto& numbers) { return static_cast<std::int64_t>(numbers.size()); }, value.numbers);
+}
+
+std::int64_t uploaded_bytes(const SceneBindings& before, const SceneBindings& after) {
+  std::int64_t bytes = 0;
+  for (const UniformValue& value : after.uniforms) bytes += bytes_of_difference(value, before.uniforms);
+  for (const HostTexture& table : after.buffers) bytes += static_cast<std::int64_t>(table.data.size());
+  return bytes;
+}
+
+}  // namespace
+
+Scene changed_scene(Scene scene) {
+  move_points(scene.transfer_function);
+  move_isovalues(scene.settings.isosurfaces.values);
+  return scene;
+}
+
+ChangeTimes time_changes(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const GpuField& gpu,
+                         const Scene& scene, int times) {
+  if (scene.settings.consumer != ConsumerKind::raycast)
+    throw UnsupportedError("time of a change: only the consumer raycast is measured");
+  if (scene.settings.prune) throw UnsupportedError("time of a change: with 'prune' what was hidden is not there to be shown");
+  const Scene other = changed_scene(scene);
+  const SceneBindings before = bind_scene(hierarchy, field, scene), after = bind_scene(hierarchy, field, other);
+  if (before.defines != after.defines) throw UnsupportedError("time of a change: the changed scene needs another shader");
+  ShaderKey vertex;
+  vertex.entry = "fullscreen.vert";
+  const SceneResources first(context, hierarchy, field, scene);
+  Program program(context, assemble_shader(vertex), assemble_shader(first.shader_key("raycast.frag", false)));
+  first.bind(program, gpu);
+  ChangeTimes result;
+  result.bytes = uploaded_bytes(before, after);
+  for (int i = 0; i < times; ++i) {
+    context.gl().Finish();
+    const auto start = std::chrono::steady_clock::now();
+    const SceneResources resources(context, hierarchy, field, i % 2 == 0 ? other : scene);
+    resources.bind(program, gpu);
+    context.gl().Finish();
+    result.wall_ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+  }
+  context.check("changing the transfer function");
+  return result;
+}
+
+}  // namespace amrtex

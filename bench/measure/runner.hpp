@@ -1,0 +1,60 @@
+// Running experiments: build, upload, draw, check, time, record.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "bench/settings/experiment.hpp"
+#include "renderers/consumers/consumer.hpp"
+#include "renderers/context/context.hpp"
+#include "structures/generators/synthetic.hpp"
+
+namespace amrtex {
+
+struct RunOptions {
+  std::filesystem::path folder;              ///< records, pictures and references are written below it
+  bool force = false;                        ///< measure again what has a record
+  std::optional<ContextKind> context;        ///< overrides the experiment's
+  std::optional<std::int64_t> memory_limit;  ///< bytes of one build; overrides the experiment's
+  /// Points that are measured; absent: all. Others are passed over as if they were not in the experiment.
+  std::function<bool(const BuildPoint&, const RenderPoint&)> wanted;
+  std::function<void(const std::string&)> progress = [](const std::string&) {};
+};
+
+struct RunSummary {
+  int measured = 0;  ///< records with status ok, written now
+  int kept = 0;      ///< had a record already
+  int unsupported = 0;
+  int over_budget = 0;
+  int failed = 0;
+};
+
+/// Measures every point that has no record yet. Points that fail or cannot be done
+/// become records too; throws only for what concerns the whole experiment.
+RunSummary run_experiment(const Experiment& experiment, const RunOptions& options);
+
+/// The mesh of one data set of an experiment, with the field that is wanted first, and after it
+/// those that some render point colours surfaces by.
+AmrHierarchy load_dataset(const Experiment& experiment, const DatasetSource& source);
+
+/// The field that a generated data set samples; null for a file.
+std::unique_ptr<AnalyticField> analytic_field(const DatasetSource& source);
+
+/// Fields beside the drawn one that the scene fetches. Throws UsageError naming the fields there are.
+std::vector<int> more_fields(const AmrHierarchy& hierarchy, const Scene& scene);
+
+/// What is legal about a scene of field 0 of this mesh, and yet likely not meant.
+std::vector<std::string> scene_warnings(const AmrHierarchy& hierarchy, const Scene& scene);
+
+/// The picture of the scene by the double reference of `definition`, from the cache
+/// below `folder` where it was drawn before. `hash` receives the name of that file.
+Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definition, const Scene& scene, double step,
+                         const std::filesystem::path& folder, std::string& hash);
+
+/// Frame times through Google Benchmark with manual time: `warm_up` frames are dropped.
+std::vector<FrameTime> time_frames(Consumer& consumer, int warm_up, int frames);
+
+}  // namespace amrtex

@@ -1,0 +1,58 @@
+#include "renderers/consumers/consumer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "renderers/consumers/box_consumer.hpp"
+#include "renderers/consumers/raycaster.hpp"
+#include "structures/mesh/error.hpp"
+
+namespace amrtex {
+namespace {
+
+GlBuffer upload(Context& context, const HostTexture& host) {
+  if (host.bytes() > context.info().max_buffer_bytes)
+    throw UnsupportedError(fmt::format("{}: {} bytes; a storage buffer of this context holds at most {}", host.name, host.bytes(),
+                                       context.info().max_buffer_bytes));
+  GlBuffer buffer = make_buffer(context);
+  context.gl().NamedBufferStorage(buffer.id(), static_cast<GLsizeiptr>(host.data.size()), host.data.data(), 0);
+  context.check("uploading " + host.name);
+  return buffer;
+}
+
+}  // namespace
+
+SceneResources::SceneResources(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene)
+    : field_(&field), bindings_(bind_scene(hierarchy, field, scene)) {
+  for (const HostTexture& b : bindings_.buffers) buffers_.push_back(upload(context, b));
+}
+
+ShaderKey SceneResources::shader_key(const std::string& entry, bool counting) const {
+  ShaderKey key;
+  key.entry = entry;
+  key.use(field_->shader);
+  for (const auto& [name, value] : bindings_.defines) key.define(name, value);
+  key.define("AMRTEX_COUNT", counting ? 1 : 0);
+  return key;
+}
+
+void SceneResources::bind(Program& program, const GpuField& gpu) const {
+  program.use();
+  for (const UniformValue& u : bindings_.uniforms) program.set_optional(u);
+  for (std::size_t i = 0; i < buffers_.size(); ++i) program.bind_buffer(bindings_.buffers[i].name + "_block", buffers_[i].id());
+  gpu.bind(program);
+}
+
+int SceneResources::buffer_count() const {
+  const auto is_buffer = [](const HostTexture& t) { return t.kind == HostTexture::Kind::buffer; };
+  return static_cast<int>(std::count_if(field_->textures.begin(), field_->textures.end(), is_buffer) + std::ssize(buffers_));
+}
+
+std::unique_ptr<Consumer> make_consumer(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field,
+                                        const GpuField& gpu, const Scene& scene) {
+  if (scene.settings.consumer == ConsumerKind::raycast) return std::make_unique<Raycaster>(context, hierarchy, field, gpu, scene);
+  return std::make_unique<BoxConsumer>(context, hierarchy, field, gpu, scene);
+}
+
+}  // namespace amrtex

@@ -1,0 +1,54 @@
+// From a key to the text of one shader: version, extensions, defines, and files
+// with their includes resolved. Pure functions; nothing here knows GL.
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "structures/common/encoding.hpp"
+
+namespace amrtex {
+
+/// Everything that decides the text of a shader.
+struct ShaderKey {
+  std::string entry;                           ///< file with main()
+  std::string encoding_file;                   ///< what `#include AMRTEX_ENCODING_FILE` stands for
+  std::vector<std::string> extensions;         ///< required
+  std::map<std::string, std::string> defines;  ///< name -> text, so always in the same order
+
+  /// Throws Error when the name has another text already.
+  ShaderKey& define(std::string_view name, std::string_view text);
+  ShaderKey& define(std::string_view name, int value);
+  /// The encoding's file, defines and extensions.
+  ShaderKey& use(const ShaderPart& part);
+};
+
+struct AssembledShader {
+  std::string text;
+  std::vector<std::string> files;  ///< index = second number of `#line`; 0 is the part before the entry file
+  std::string hash;                ///< of the text, 32 hexadecimal digits
+};
+
+/// path -> text
+using ShaderFiles = std::map<std::string, std::string, std::less<>>;
+
+/// Includes are resolved in the embedded library. Each file is taken once; throws
+/// Error naming file, line and chain of includes for a missing file, a cycle, and a
+/// file that `#if` may have left out where it is included again.
+AssembledShader assemble_shader(const ShaderKey& key);
+AssembledShader assemble_shader(const ShaderKey& key, const ShaderFiles& files);
+
+/// A driver's log with its "file number:line" replaced by names, in the spellings of
+/// Mesa and Intel (`0:12(5): `), NVIDIA (`0(12) : `) and AMD (`ERROR: 0:12: `).
+std::string map_log(std::string_view log, const std::vector<std::string>& files);
+
+/// 32 hexadecimal digits.
+std::string hash_text(std::string_view text);
+
+/// Literals that read back as the same number; throw Error unless finite.
+std::string glsl_literal(float value);
+std::string glsl_literal(double value);  ///< with the suffix `lf`
+
+}  // namespace amrtex

@@ -1,0 +1,382 @@
+#include "renderers/reference/hierarchy_reference.hpp"
+
+#include <fmt/format.h>
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <array>
+#include <cmath>
+#include <map>
+#include <mutex>
+
+#include "renderers/consumers/triangle_layer.hpp"
+#include "renderers/reference/reference_clip.hpp"
+#include "renderers/reference/reference_field.hpp"
+#include "renderers/reference/reference_fields.hpp"
+#include "renderers/reference/reference_light.hpp"
+#include "renderers/reference/reference_parts.hpp"
+#include "renderers/reference/reference_point.hpp"
+#include "renderers/reference/reference_surface.hpp"
+#include "renderers/reference/reference_tracer.hpp"
+
+namespace amrtex {
+namespace {
+
+constexpr int kTile = 16;  // pixels; neighbouring rays share the cells in the caches
+
+/// What a picture needs besides the field, worked out once.
+struct Drawing {
+  CameraFrame camera;
+  Vec3d lower, upper;    // of what is drawn, finest space
+  Vec3d domain_lower;    // world
+  Vec3d cells_a_length;  // finest cells a world length, along the axes
+  Mode mode;
+  double part;  // world length of the largest part
+  const TransferTable* table;
+  const AnalyticField* truth;     // drawn instead of the field, where it is not null
+  std::vector<ClipPlane> planes;  // finest cells
+  std::optional<Mirror> mirror;
+};
+
+Vec3d to_index(const AmrHierarchy& h, const Vec3d& p_world) {
+  return (p_world - h.domain_lower()) * Vec3d(h.cells(h.finest_level())) / (h.domain_upper() - h.domain_lower());
+}
+
+Drawing make_drawing(const AmrHierarchy& h, const Scene& scene, double step, const TransferTable* table,
+                     const AnalyticField* truth) {
+  const Vec3d domain(h.cells(h.finest_level()));
+  const Vec3d spacing = h.spacing(h.finest_level());
+  Drawing d{camera_frame(scene.view, scene.settings.width, scene.settings.height),
+            Vec3d(0),
+            domain,
+            h.domain_lower(),
+            domain / (h.domain_upper() - h.domain_lower()),
+            scene.settings.mode,
+            step * std::min({spacing.x, spacing.y, spacing.z}),
+            table,
+            truth,
+            {},
+            {}};
+  d.mirror = scene.settings.mirror;
+  for (const ClipPlane& plane : scene.settings.clip_planes) d.planes.push_back(in_finest_cells(h, plane));
+  if (scene.region) {
+    d.lower = glm::max(d.lower, to_index(h, (*scene.region)[0]));
+    d.upper = glm::min(d.upper, to_index(h, (*scene.region)[1]));
+  }
+  return d;
+}
+
+/// The ray's stretch in a closed box, not before its start; nullopt where they do not meet.
+std::optional<Span> stretch_in(const IndexRay& ray, const Vec3d& lower, const Vec3d& upper) {
+  Span span{0, std::numeric_limits<double>::infinity()};
+  for (int a = 0; a < 3; ++a) {
+    if (ray.direction[a] == 0) {
+      if (ray.origin[a] < lower[a] || ray.origin[a] > upper[a]) return std::nullopt;
+      continue;
+    }
+    const double t0 = (lower[a] - ray.origin[a]) / ray.direction[a];
+    const double t1 = (upper[a] - ray.origin[a]) / ray.direction[a];
+    span.from = std::max(span.from, std::min(t0, t1));
+    span.to = std::min(span.to, std::max(t0, t1));
+  }
+  if (!(span.to > span.from)) return std::nullopt;
+  return span;
+}
+
+/// The cubic through the values at 0, 1/3, 2/3 and 1 of a piece.
+PieceFunction cubic_through(const std::array<double, 4>& v) {
+  PieceFunction f;
+  const double d1 = v[1] - v[0], d2 = v[2] - v[0], d3 = v[3] - v[0];
+  f.numerator.c = {v[0], 9 * d1 - 4.5 * d2 + d3, -22.5 * d1 + 18 * d2 - 4.5 * d3, 13.5 * d1 - 13.5 * d2 + 4.5 * d3};
+  f.denominator.c[0] = 1;
+  f.upper = maximum(f);
+  PieceFunction below = f;
+  for (double& c : below.numerator.c) c = -c;
+  f.lower = -maximum(below);
+  return f;
+}
+
+/// A ray through an analytic field, its pieces those of the mesh in parts of at most `part`.
+class AnalyticRay {
+ public:
+  AnalyticRay(const Drawing& drawing, const IndexRay& ray) : drawing_(drawing), ray_(ray) {}
+
+  template <class Visit>
+  bool visit_parts(double from, double to, Visit&& visit) const {
+    const auto count = static_cast<int>(std::max(std::ceil((to - from) / drawing_.part), 1.0));
+    const double length = (to - from) / count;
+    for (int i = 0; i < count; ++i) {
+      std::array<double, 4> values{};
+      for (std::size_t k = 0; k < 4; ++k) values[k] = value(from + length * (i + static_cast<double>(k) / 3));
+      if (!visit(cubic_through(values), from + length * i, from + length * (i + 1))) return false;
+    }
+    return true;
+  }
+
+ private:
+  double value(double t) const {
+    return drawing_.truth->value(drawing_.domain_lower + (ray_.origin + t * ray_.direction) / drawing_.cells_a_length);
+  }
+
+  const Drawing& drawing_;
+  const IndexRay& ray_;
+};
+
+/// Pieces of the field, or of the analytic one in its place, through all parts of a ray; places count from its first.
+template <class Visit>
+void trace(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const Drawing& drawing, Visit&& visit) {
+  bool more = true;
+  for (const RayPart& part : parts) {
+    if (!more) return;
+    const auto visit_piece = [&](const PieceFunction& f, double from, double to) {
+      more = visit(f, part.start + from, part.start + to);
+      return more;
+    };
+    if (drawing.truth == nullptr) {
+      tracer.trace(part.ray, part.length, visit_piece);
+      continue;
+    }
+    const AnalyticRay analytic(drawing, part.ray);
+    tracer.trace(part.ray, part.length,
+                 [&](const PieceFunction&, double from, double to) { return analytic.visit_parts(from, to, visit_piece); });
+  }
+}
+
+void draw_light(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const Drawing& drawing, LightIntegral::Arriving lamp,
+                double* pixel) {
+  LightIntegral light(*drawing.table, std::move(lamp));
+  trace(tracer, parts, drawing, [&](const PieceFunction& f, double from, double to) {
+    light.add(f, to - from, drawing.part, 0, 1, from);
+    return light.transmittance() >= LightIntegral::kOpaque;
+  });
+  for (int c = 0; c < 3; ++c) pixel[c] = light.color()[c];
+  pixel[3] = 1 - light.transmittance();
+}
+
+/// A further field of a volume.
+struct OtherField {
+  const ReferenceField* field;
+  TransferTable table;
+};
+
+/// draw_light() of several fields.
+void draw_fields(ReferenceTracer& first, std::vector<ReferenceTracer>& others, const std::vector<RayPart>& parts,
+                 const Drawing& drawing, const std::vector<OtherField>& other_fields, double* pixel) {
+  std::vector<const TransferTable*> tables{drawing.table};
+  for (const OtherField& other : other_fields) tables.push_back(&other.table);
+  FieldsLight fields(std::move(tables));
+  for (std::size_t i = 0; i < 1 + others.size(); ++i)
+    trace(i == 0 ? first : others[i - 1], parts, drawing, [&](const PieceFunction& f, double from, double to) {
+      fields.add(i, f, from, to);
+      return true;
+    });
+  LightIntegral light;
+  fields.drain(light, drawing.part);
+  for (int c = 0; c < 3; ++c) pixel[c] = light.color()[c];
+  pixel[3] = 1 - light.transmittance();
+}
+
+double line_integral(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const Drawing& drawing) {
+  const double part = drawing.part;
+  double sum = 0;
+  trace(tracer, parts, drawing, [&](const PieceFunction& f, double from, double to) {
+    sum += (to - from) * mean(f, static_cast<int>(std::clamp(std::ceil((to - from) / part), 1.0, 16.0)));
+    return true;
+  });
+  return sum;
+}
+
+double line_maximum(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const Drawing& drawing) {
+  double best = -std::numeric_limits<double>::infinity();
+  trace(tracer, parts, drawing, [&](const PieceFunction& f, double, double) {
+    if (f.upper > best) best = std::max(best, maximum(f));
+    return true;
+  });
+  return std::isfinite(best) ? best : 0;
+}
+
+/// What one thread draws with.
+struct Worker {
+  ReferenceTracer tracer;
+  std::optional<SurfacePainter> painter;  // where there are surfaces
+  std::optional<LampTracer> lamp;         // where there is one
+  std::vector<ReferenceTracer> others;    // of further fields
+};
+
+/// Light of the lamp along a ray; empty where there is no lamp.
+LightIntegral::Arriving arriving_light(Worker& worker, const IndexRay& ray) {
+  if (!worker.lamp) return {};
+  return [&lamp = *worker.lamp, &ray](double t) { return lamp.light_at(ray.origin + t * ray.direction); };
+}
+
+/// `most`: world length of the ray at which it ends at the latest.
+void draw_pixel(Worker& worker, const Drawing& drawing, const std::vector<OtherField>& others, int x, int y, double most,
+                Picture& picture) {
+  const WorldRay world = camera_ray(drawing.camera, x, y, picture.width, picture.height);
+  IndexRay ray{(world.origin - drawing.domain_lower) * drawing.cells_a_length, world.direction * drawing.cells_a_length};
+  Vec3d lower = drawing.lower;
+  Vec3d upper = drawing.upper;
+  double face = 0;
+  if (drawing.mirror) {  // the image is drawn too
+    const int axis = drawing.mirror->axis;
+    face = drawing.mirror->upper ? upper[axis] : lower[axis];
+    (drawing.mirror->upper ? upper : lower)[axis] += (drawing.mirror->upper ? 1 : -1) * (upper[axis] - lower[axis]);
+  }
+  auto span = stretch_in(ray, lower, upper);
+  if (span) span = cut(ray, drawing.planes, {span->from, std::min(span->to, most)});
+  if (!span || !(span->to > span->from)) return;
+  ray.origin += span->from * ray.direction;  // from here on no digits are spent on the way to the mesh
+  const std::vector<RayPart> parts = parts_of(ray, world.direction, span->to - span->from, drawing.mirror, face);
+  double* pixel = picture.pixel(x, y);
+  switch (drawing.mode) {
+    case Mode::dvr:
+      if (others.empty())
+        draw_light(worker.tracer, parts, drawing, arriving_light(worker, ray), pixel);
+      else
+        draw_fields(worker.tracer, worker.others, parts, drawing, others, pixel);
+      break;
+    case Mode::projection:
+      *pixel = line_integral(worker.tracer, parts, drawing);
+      break;
+    case Mode::mip:
+      *pixel = line_maximum(worker.tracer, parts, drawing);
+      break;
+    case Mode::iso:
+    case Mode::dvr_iso:
+      worker.painter->draw(worker.tracer, parts, drawing.mirror, span->from, arriving_light(worker, ray), pixel);
+      break;
+  }
+}
+
+/// What is left of a triangle's light behind the volume; pictures of one channel have no place for it.
+void draw_triangle(const RenderSettings& s, const TriangleLayer::Pixel& first, double* pixel) {
+  if (first.object < 0 || s.picture_channels() == 1) return;
+  const Vec3d rgb = s.triangles[static_cast<std::size_t>(first.object)].color * first.light;
+  for (int c = 0; c < 3; ++c) pixel[c] += (1 - pixel[3]) * rgb[c];
+  pixel[3] = 1;
+}
+
+void check(const Scene& scene, double step) {
+  if (!(step > 0)) throw Error(fmt::format("reference step {}: must be a positive number of cell widths", step));
+  if (scene.settings.width < 1 || scene.settings.height < 1)
+    throw Error(fmt::format("picture of {} x {} pixels: both must be at least 1", scene.settings.width, scene.settings.height));
+  if (scene.settings.draws_volume()) validate(scene.transfer_function);
+  if (scene.settings.draws_surfaces()) validate(scene.settings.isosurfaces);
+  validate_light(scene.settings);
+  validate_clip_planes(scene.settings.clip_planes);
+  validate_mirror(scene.settings);
+  validate_fields(scene);
+  validate_triangles(scene.settings);
+}
+
+double extinction_scale(const AmrHierarchy& h, const TransferFunction& tf) {
+  const Vec3d edges = h.domain_upper() - h.domain_lower();
+  return tf.length_unit == TransferFunction::LengthUnit::world ? 1 : 1 / std::max({edges.x, edges.y, edges.z});
+}
+
+}  // namespace
+
+std::optional<FinestPosition> finest_position(const AmrHierarchy& hierarchy, const Vec3d& p_world) {
+  // asked in the world: a point at the domain's upper end may be rounded past it in cells
+  for (int a = 0; a < 3; ++a)
+    if (!(p_world[a] >= hierarchy.domain_lower()[a] && p_world[a] <= hierarchy.domain_upper()[a])) return std::nullopt;
+  return position_at(hierarchy, glm::min(to_index(hierarchy, p_world), Vec3d(hierarchy.cells(hierarchy.finest_level()))));
+}
+
+struct HierarchyReference::Data {
+  ReferenceField field;
+  std::mutex mutex;
+  std::map<int, ReferenceField> others;  // made when a scene first asks for them
+  tbb::enumerable_thread_specific<VertexCache> vertices;
+
+  const ReferenceField* color_field(const Scene& scene);
+  const ReferenceField* other_field(const std::string& name);
+};
+
+/// The field that colours the scene's surfaces; null where the isovalue does.
+const ReferenceField* HierarchyReference::Data::color_field(const Scene& scene) {
+  const std::string& name = scene.settings.isosurfaces.color_field;
+  if (!scene.settings.draws_surfaces() || name.empty()) return nullptr;
+  return other_field(name);
+}
+
+const ReferenceField* HierarchyReference::Data::other_field(const std::string& name) {
+  const int index = field.hierarchy().field_index(name);
+  const std::lock_guard lock(mutex);
+  // while it waits for its own tasks this thread must not take up another picture, which would lock again
+  return tbb::this_task_arena::isolate(
+      [&] { return &others.try_emplace(index, field.hierarchy(), index, field.definition()).first->second; });
+}
+
+HierarchyReference::HierarchyReference(const AmrHierarchy& hierarchy, int field, FilterDefinition definition)
+    : data_(new Data{ReferenceField(hierarchy, field, definition), {}, {}, {}}) {}
+HierarchyReference::~HierarchyReference() = default;
+
+std::optional<double> HierarchyReference::sample(const FinestPosition& p) const {
+  const bool vertices = data_->field.definition().filter == Filter::linear_vertex;  // the one filter that keeps any
+  return value_at(data_->field, p, vertices ? &data_->vertices.local() : nullptr);
+}
+
+std::optional<double> HierarchyReference::sample(const Vec3d& p_world) const {
+  const auto p = finest_position(data_->field.hierarchy(), p_world);
+  return p ? sample(*p) : std::nullopt;
+}
+
+Picture HierarchyReference::render(const Scene& scene, double step) const { return draw(scene, step, nullptr); }
+
+Picture HierarchyReference::render(const Scene& scene, double step, const AnalyticField& truth) const {
+  if (scene.settings.draws_surfaces())
+    throw UsageError(
+        fmt::format("mode {}: an analytic field is drawn in the modes dvr, projection and mip", mode_name(scene.settings.mode)));
+  if (!scene.more_fields.empty()) throw UsageError("an analytic field is drawn alone, without further fields");
+  return draw(scene, step, &truth);
+}
+
+Picture HierarchyReference::draw(const Scene& scene, double step, const AnalyticField* truth) const {
+  check(scene, step);
+  const AmrHierarchy& h = data_->field.hierarchy();
+  const ReferenceField* color_field = data_->color_field(scene);
+  std::optional<TransferTable> table;
+  if (scene.settings.draws_volume()) table.emplace(scene.transfer_function, extinction_scale(h, scene.transfer_function));
+  const Drawing drawing = make_drawing(h, scene, step, table ? &*table : nullptr, truth);
+  std::optional<SurfaceScene> surfaces;
+  if (scene.settings.draws_surfaces()) surfaces.emplace(scene, data_->field, color_field, drawing.table, drawing.part);
+  if (surfaces) {
+    surfaces->lower = drawing.lower;
+    surfaces->upper = drawing.upper;
+    surfaces->planes = drawing.planes;
+  }
+  std::optional<LampScene> lamp;
+  if (scene.settings.point_light)
+    lamp.emplace(scene, data_->field, extinction_scale(h, scene.transfer_function), drawing.lower, drawing.upper, drawing.part);
+  std::vector<OtherField> others;
+  for (const FieldTransfer& f : scene.more_fields)
+    others.push_back({data_->other_field(f.field), TransferTable(f.transfer_function, extinction_scale(h, f.transfer_function))});
+  std::optional<TriangleLayer> triangles;
+  if (!scene.settings.triangles.empty()) triangles = trace_triangles(scene);
+  Picture picture(scene.settings.width, scene.settings.height, scene.settings.picture_channels());
+  const int columns = ceil_div(picture.width, kTile);
+  tbb::enumerable_thread_specific<Worker> workers([&] {
+    Worker worker{ReferenceTracer(data_->field), std::nullopt, std::nullopt, {}};
+    for (const OtherField& other : others) worker.others.emplace_back(*other.field);
+    if (surfaces) worker.painter.emplace(*surfaces);
+    if (lamp) worker.lamp.emplace(*lamp);
+    return worker;
+  });
+  tbb::parallel_for(0, columns * ceil_div(picture.height, kTile), [&](int tile) {
+    Worker& worker = workers.local();
+    const int x0 = tile % columns * kTile;
+    const int y0 = tile / columns * kTile;
+    for (int y = y0; y < std::min(y0 + kTile, picture.height); ++y)
+      for (int x = x0; x < std::min(x0 + kTile, picture.width); ++x) {
+        const TriangleLayer::Pixel first = triangles ? triangles->at(x, y) : TriangleLayer::Pixel{};
+        draw_pixel(worker, drawing, others, x, y, first.distance, picture);
+        draw_triangle(scene.settings, first, picture.pixel(x, y));
+      }
+  });
+  return picture;
+}
+
+}  // namespace amrtex

@@ -1,0 +1,140 @@
+// The mathematics of the filters by search in the hierarchy (shaders/README.md,
+// "Filters"): level values, fills, vertex values, pages. Private to the reference;
+// written from the definitions and from leaf cells alone, not shared with encodings.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include "structures/mesh/amr_hierarchy.hpp"
+#include "structures/mesh/filter.hpp"
+
+namespace amrtex {
+
+struct CellHash {
+  std::size_t operator()(const Vec3i& c) const {
+    std::uint64_t h = static_cast<std::uint32_t>(c.x) * 0x9E3779B97F4A7C15ULL;
+    h = (h ^ (h >> 29) ^ static_cast<std::uint32_t>(c.y)) * 0xBF58476D1CE4E5B9ULL;
+    h = (h ^ (h >> 29) ^ static_cast<std::uint32_t>(c.z)) * 0x94D049BB133111EBULL;
+    return static_cast<std::size_t>(h ^ (h >> 31));
+  }
+};
+
+/// f = sum of coefficient k times the product of those of x, y, z whose bit is set in k.
+struct Trilinear {
+  std::array<double, 8> coefficients{};
+  /// From the values at the corners of the unit cube, x fastest.
+  static Trilinear through(const std::array<double, 8>& corners);
+  double operator()(const Vec3d& q) const;
+};
+
+struct ReferenceLeaf {
+  int level = -1;  ///< -1: no mesh here
+  int patch = -1;
+  Vec3i cell{0};
+  double value = 0;  ///< NaN where the leaf has none
+};
+
+/// Values of vertices, kept from one look-up to the next; of one thread.
+class VertexCache {
+ public:
+  struct Entry {
+    Vec3i vertex{-1};
+    double value = 0;
+  };
+  Entry& at(const Vec3i& vertex) { return entries_[CellHash{}(vertex) & (kEntries - 1)]; }
+
+ private:
+  static constexpr std::size_t kEntries = std::size_t{1} << 16;
+  std::vector<Entry> entries_ = std::vector<Entry>(kEntries);
+};
+
+/// Immutable; safe to use from several threads.
+class ReferenceField {
+ public:
+  ReferenceField(const AmrHierarchy& hierarchy, int field, const FilterDefinition& definition);
+
+  const AmrHierarchy& hierarchy() const { return hierarchy_; }
+  const FilterDefinition& definition() const { return definition_; }
+  bool has_missing() const { return has_missing_; }
+  int width(int level) const { return levels_[static_cast<std::size_t>(level)].width; }
+
+  /// Leaf that holds a cell of the finest level, which lies in the domain. `hint` is tried first.
+  ReferenceLeaf find_leaf(const Vec3i& finest_cell, const ReferenceLeaf& hint = {}) const;
+  /// Largest cell around a cell of the finest level that holds no leaf (finest space).
+  Box empty_box(const Vec3i& finest_cell) const;
+
+  /// v_L; NaN where there is none.
+  double level_value(int level, const Vec3i& cell) const;
+  /// v_L or the fill of a missing cell; NaN where there is no neighbour either.
+  double filled_value(int level, const Vec3i& cell) const;
+
+  /// The 8 filled level values of the cells lower + {0, 1}^3.
+  struct DualCell {
+    std::array<double, 8> values;
+    bool all_leaves;  ///< all 8 cells are leaves of this level that have a value
+  };
+  DualCell dual_cell(int level, const Vec3i& lower) const;
+
+  /// The leaves with a value among the cells lower + {0, 1}^3.
+  struct BasisCell {
+    std::array<double, 8> values;   ///< 0 where there is none
+    std::array<double, 8> weights;  ///< 1 or 0
+    bool any;
+    bool finer;  ///< leaves of finer levels may reach between the centres of these cells
+  };
+  BasisCell basis_cell(int level, const Vec3i& lower) const;
+
+  /// Value of filter `linear_vertex` at a corner of finest cells (finest space).
+  /// A function of the place alone: with m the coarsest level whose leaves touch it, the
+  /// mean of 8 v_m where it is a corner of level m, else that leaf's own interpolant.
+  double vertex_value(const Vec3i& vertex, VertexCache* cache) const;
+  /// Vertex values of a leaf, x fastest.
+  std::array<double, 8> leaf_vertices(const ReferenceLeaf& leaf, VertexCache* cache) const;
+
+  /// Level of the page that holds a cell of the finest level (filter `linear_page`).
+  int page_level(const Vec3i& finest_cell) const;
+  /// Box of that page (finest space).
+  Box page_box(int level, const Vec3i& finest_cell) const;
+
+ private:
+  struct Mean {
+    double value = std::numeric_limits<double>::quiet_NaN();
+    double share = 0;  ///< of the cell's volume that has a value
+  };
+  struct PatchView {
+    Box box;
+    const double* values;  // of the file
+    const std::uint8_t* leaf;
+    std::vector<double> means;   // v_L, where the patch has refined cells; else empty
+    std::vector<double> shares;  // where they are not all 1; else empty
+  };
+  struct Level {
+    int width;
+    std::vector<PatchView> patches;
+    std::unordered_map<Vec3i, Mean, CellHash> unstored;  // refined cells that no patch of this level stores
+    std::unordered_set<Vec3i, CellHash> split_pages;
+  };
+
+  const Level& at(int level) const { return levels_[static_cast<std::size_t>(level)]; }
+  static double stored_value(const PatchView& patch, std::size_t offset);
+  const PatchView* find_patch(int level, const Vec3i& cell) const;
+  Mean mean_of(int level, const Vec3i& cell) const;
+  Mean mean_of_children(int level, const Vec3i& cell) const;
+  void restrict_patch(int level, PatchView& patch) const;
+  void find_unstored(int level);
+  void split_pages(int level);
+  double neighbour_mean(int level, const Vec3i& cell, int distance) const;
+  double compute_vertex(const Vec3i& vertex, VertexCache* cache) const;
+  double interpolate(int axis, Vec3i corner, int width, const Vec3d& q, VertexCache* cache) const;
+
+  const AmrHierarchy& hierarchy_;
+  FilterDefinition definition_;
+  std::vector<Level> levels_;
+  bool has_missing_ = false;
+};
+
+}  // namespace amrtex

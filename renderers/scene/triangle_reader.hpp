@@ -1,0 +1,15 @@
+// Files of triangles: OBJ, PLY and STL, through the library assimp.
+#pragma once
+
+#include <filesystem>
+
+#include "renderers/scene/triangle_mesh.hpp"
+
+namespace amrtex {
+
+/// All triangles of a file that ends in .obj, .ply or .stl; polygons are cut into triangles, points and lines left out.
+/// Coordinates are as the file has them, rounded to 32-bit floats (the library's). Throws Error naming the file, what is wrong
+/// and what is accepted.
+TriangleMesh read_triangles(const std::filesystem::path& path);
+
+}  // namespace amrtex

@@ -1,0 +1,237 @@
+#include "structures/common/build_tools.hpp"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <cmath>
+#include <limits>
+
+namespace amrtex {
+
+void ValueRange::add(double value) {
+  if (std::isnan(value)) return;
+  if (empty()) {
+    min = max = value;
+  } else {
+    min = std::min(min, value);
+    max = std::max(max, value);
+  }
+}
+
+namespace {
+
+/// How far a decoded value may lie from the one that was stored.
+double storage_slack(Storage storage, StorageScale scale, double largest) {
+  double slack = 4e-7 * std::max(largest, storage == Storage::r32f ? 0.0 : std::abs(scale.scale));
+  if (storage == Storage::r8) slack += scale.scale * (0.51 / 255);
+  if (storage == Storage::r16) slack += scale.scale * (0.51 / 65535);
+  if (storage == Storage::r16f) slack += scale.scale * std::ldexp(1.0, -11);
+  return slack;
+}
+
+}  // namespace
+
+double range_origin(const FieldStatistics& s, Storage storage, StorageScale scale) {
+  if (std::isnan(s.min)) return 0;
+  // interpolants of values from 0 up stay there: regions of 0 then have the range (0, 0), which projections skip
+  if (s.min == 0 && (storage == Storage::r32f || storage == Storage::r64f)) return 0;
+  const double lowest = s.min - storage_slack(storage, scale, std::max(std::abs(s.min), std::abs(s.max)));
+  return static_cast<double>(std::nextafter(static_cast<float>(lowest), -std::numeric_limits<float>::infinity()));
+}
+
+std::uint32_t encode_range(ValueRange range, double origin, Storage storage, StorageScale scale) {
+  if (range.empty()) return kNoRange;
+  const double slack = storage_slack(storage, scale, std::max(std::abs(range.min), std::abs(range.max)));
+  // one part in 2^20 for the shader's own sum of origin and distance
+  const double margin = slack + std::ldexp(std::abs(origin), -20);
+  const auto low = static_cast<float>(std::max(range.min - margin - origin, 0.0) * (1 - 1e-6));
+  const auto high = static_cast<float>((range.max + margin - origin) * (1 + 1e-6));
+  const std::uint32_t below = std::bit_cast<std::uint32_t>(low) >> 16;
+  const std::uint32_t above = (std::bit_cast<std::uint32_t>(high) + 0xffffU) >> 16;
+  return below | (std::min(above, 0x7f80U) << 16);
+}
+
+std::uint32_t encode_range(const EncodedField& field, int number, ValueRange range) {
+  if (range.empty()) return kVacantRange;
+  const double origin = number == 0 ? field.range_origin : field.more_range_origins[static_cast<std::size_t>(number - 1)];
+  return encode_range(range, origin, field.storage, field.scale_of(number));
+}
+
+std::int64_t MoreRanges::bytes(const BuildRequest& request, std::int64_t regions) {
+  return request.needs.field_ranges ? 4 * std::max<std::int64_t>(regions, 1) * (request.field_count() - 1) : 0;
+}
+
+MoreRanges::MoreRanges(const Encoding& encoding, const BuildRequest& request, const std::string& name, std::int64_t regions)
+    : fields_(request.field_count()) {
+  const std::int64_t size = bytes(request, regions);
+  if (size == 0) return;
+  if (size > request.context.max_buffer_bytes)
+    throw UnsupportedError(
+        fmt::format("encoding {}: value ranges of further fields take {} bytes, a buffer of this context at most {}",
+                    encoding.name(), size, request.context.max_buffer_bytes));
+  buffer_ = make_buffer(name, TexelFormat::r32ui, size / 4);
+}
+
+void MoreRanges::set(const EncodedField& field, std::int64_t region, int number, ValueRange range) {
+  if (number == 0 || !needed()) return;
+  buffer_.as<std::uint32_t>()[region * (fields_ - 1) + number - 1] = encode_range(field, number, range);
+}
+
+void MoreRanges::move_to(EncodedField& field) {
+  if (needed()) field.textures.push_back(std::move(buffer_));
+}
+
+bool hidden(const SceneNeeds& needs, ValueRange range, double origin, Storage storage, StorageScale scale) {
+  if (needs.invisible.empty()) return false;
+  if (range.empty()) return true;
+  const std::uint32_t code = encode_range(range, origin, storage, scale);
+  // as decode_range and the uniforms: in floats
+  const float low = static_cast<float>(origin) + std::bit_cast<float>(code << 16);
+  const float high = static_cast<float>(origin) + std::bit_cast<float>(code & 0xffff0000U);
+  for (const auto& [first, last] : needs.invisible)
+    if (low >= static_cast<float>(first) && high <= static_cast<float>(last)) return true;
+  return false;
+}
+
+void store_values(Storage storage, StorageScale scale, const double* values, std::size_t count, std::byte* data,
+                  std::size_t first) {
+  if (storage == Storage::r32f) {
+    auto* out = reinterpret_cast<float*>(data) + first;
+    for (std::size_t i = 0; i < count; ++i) out[i] = std::isnan(values[i]) ? 0.0F : static_cast<float>(values[i]);
+    return;
+  }
+  for (std::size_t i = 0; i < count; ++i)
+    store_value(storage, scale, std::isnan(values[i]) ? scale.offset : values[i], data, first + i);
+}
+
+HostTexture make_texture(std::string name, TexelFormat format, const Vec3i& size) {
+  HostTexture t;
+  t.name = std::move(name);
+  t.kind = HostTexture::Kind::texture_3d;
+  t.format = format;
+  t.size = size;
+  t.data.resize(static_cast<std::size_t>(t.bytes()));
+  return t;
+}
+
+HostTexture make_buffer(std::string name, TexelFormat format, std::int64_t elements) {
+  HostTexture t = make_texture(std::move(name), format, {static_cast<int>(std::max<std::int64_t>(elements, 1)), 1, 1});
+  t.kind = HostTexture::Kind::buffer;
+  t.roles.topology = t.bytes();
+  return t;
+}
+
+void write_box(const Box& box, std::uint32_t fourth, std::uint32_t eighth, std::uint32_t* words) {
+  for (int a = 0; a < 3; ++a) {
+    words[a] = static_cast<std::uint32_t>(box.lower[a]);
+    words[4 + a] = static_cast<std::uint32_t>(box.upper[a]);
+  }
+  words[3] = fourth;
+  words[7] = eighth;
+}
+
+bool power_of_two_ratios(const AmrHierarchy& hierarchy) {
+  for (int l = 0; l < hierarchy.finest_level(); ++l) {
+    const int r = hierarchy.ratio_to_finer(l);
+    if ((r & (r - 1)) != 0) return false;
+  }
+  return true;
+}
+
+namespace {
+
+/// log2 of the ratio where all levels have the same power of two; 0 otherwise.
+int common_ratio_shift(const AmrHierarchy& hierarchy) {
+  if (hierarchy.finest_level() == 0) return 1;  // there is no ratio; any will do
+  const auto r = static_cast<unsigned>(hierarchy.ratio_to_finer(0));
+  for (int l = 1; l < hierarchy.finest_level(); ++l)
+    if (static_cast<unsigned>(hierarchy.ratio_to_finer(l)) != r) return 0;
+  return std::has_single_bit(r) ? std::countr_zero(r) : 0;
+}
+
+}  // namespace
+
+namespace {
+
+/// Throws UnsupportedError where 32-bit floats cannot hold the values, or a linear filter their differences.
+void require_float_values(const Encoding& encoding, const AmrHierarchy& h, const BuildRequest& request) {
+  constexpr double kMost = std::numeric_limits<float>::max();
+  if (request.storage == Storage::r64f) return;  // of the CPU's double precision
+  for (int i = 0; i < request.field_count(); ++i) {
+    const FieldStatistics& s = h.statistics(request.field_at(i));
+    const bool linear = request.needs.filter != Filter::nearest;
+    if (s.max > kMost || s.min < -kMost || (linear && s.max - s.min > kMost))
+      throw UnsupportedError(
+          fmt::format("encoding {}: values from {:.3g} to {:.3g} with filter {}; accepted: magnitudes{} up to {:.3g}, what a "
+                      "32-bit float holds",
+                      encoding.name(), s.min, s.max, filter_name(request.needs.filter), linear ? " and differences" : "", kMost));
+  }
+}
+
+}  // namespace
+
+bool any_missing(const AmrHierarchy& hierarchy, const BuildRequest& request) {
+  if (request.needs.keeps_validity()) return true;
+  for (int i = 0; i < request.field_count(); ++i)
+    if (hierarchy.has_missing(request.field_at(i))) return true;
+  return false;
+}
+
+Filtering stored_filtering(const BuildRequest& request) {
+  const bool linear = request.needs.filter != Filter::nearest;
+  return linear && request.storage != Storage::r64f ? request.needs.filtering : Filtering::manual;
+}
+
+EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request,
+                         const Json& parameters) {
+  require_fields(encoding, hierarchy, request);
+  require_level_of_detail(encoding, request.needs);
+  require_analytic_gradients(encoding, request.needs);
+  require_float_values(encoding, hierarchy, request);
+  EncodedField field;
+  field.encoding = encoding.name();
+  field.build_parameters = parameters;
+  field.definition.filter = request.needs.filter;
+  field.filtering = stored_filtering(request);
+  field.storage = request.storage;
+  const FieldStatistics& s = hierarchy.statistics(request.field);
+  field.scale = storage_scale(request.storage, s.min, s.max);
+  field.field_count = request.field_count();
+  for (const int other : request.more_fields) {
+    const FieldStatistics& o = hierarchy.statistics(other);
+    field.more_scales.push_back(storage_scale(request.storage, o.min, o.max));
+    if (request.needs.field_ranges)
+      field.more_range_origins.push_back(range_origin(o, request.storage, field.more_scales.back()));
+  }
+  const bool scaled = request.storage != Storage::r32f && request.storage != Storage::r64f;
+  field.range_origin = range_origin(s, request.storage, field.scale);
+  field.invisible = request.needs.invisible;
+  field.shader.file = fmt::format("{0}/{0}.glsl", encoding.name());
+  field.shader.defines = {{"AMRTEX_FILTER", static_cast<int>(request.needs.filter)},
+                          {"AMRTEX_HARDWARE_FILTERING", field.filtering == Filtering::hardware ? 1 : 0},
+                          {"AMRTEX_POWER_OF_TWO", power_of_two_ratios(hierarchy) ? 1 : 0},
+                          {"AMRTEX_RATIO_SHIFT", common_ratio_shift(hierarchy)},
+                          {"AMRTEX_LEVELS", hierarchy.level_count()},
+                          {"AMRTEX_FIELDS", field.field_count},
+                          {"AMRTEX_VALIDITY", any_missing(hierarchy, request) ? 1 : 0},
+                          {"AMRTEX_VALUE_RANGES", request.needs.value_ranges ? 1 : 0},
+                          {"AMRTEX_FIELD_RANGES", request.needs.field_ranges && request.field_count() > 1 ? 1 : 0},
+                          {"AMRTEX_SCALED_STORAGE", scaled ? 1 : 0},
+                          {"AMRTEX_LEVEL_OF_DETAIL", request.needs.level_of_detail ? 1 : 0}};
+  return field;
+}
+
+int integer_parameter(const Encoding& encoding, const Json& parameters, std::string_view name) {
+  const Json& value = parameters.at(std::string(name));
+  if (value.is_number_integer()) {
+    const auto wide = value.get<std::int64_t>();
+    if (wide == static_cast<int>(wide)) return static_cast<int>(wide);
+  }
+  for (const ParameterInfo& p : encoding.parameters())
+    if (p.name == name)
+      throw UsageError(
+          fmt::format("encoding {}: parameter {} is {}; accepted: {}", encoding.name(), name, value.dump(), p.accepted));
+  throw UsageError(fmt::format("encoding {}: parameter {} is {}", encoding.name(), name, value.dump()));
+}
+
+}  // namespace amrtex

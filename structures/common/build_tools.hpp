@@ -1,0 +1,103 @@
+// What builders of encodings share: storing blocks of values, validity bits, ranges.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "structures/common/encoding.hpp"
+
+namespace amrtex {
+
+/// Minimum and maximum of values; NaN is left out; minimum > maximum when none is left.
+struct ValueRange {
+  double min = 1;
+  double max = -1;
+  bool empty() const { return min > max; }
+  void add(double value);
+  bool operator==(const ValueRange&) const = default;
+};
+
+/// Code of a range that holds no value: no mesh.
+inline constexpr std::uint32_t kNoRange = 0xffffffffU;
+/// Code of a region where the drawn field has no value and another one has: the mesh is there, and the
+/// range covers nothing. It decodes to a minimum of infinity and a maximum at the origin: most volumes may
+/// skip it, and no isovalue has all of it on one side, so that a ray does not take a side there.
+inline constexpr std::uint32_t kVacantRange = 0x00007f80U;
+
+/// What ranges are relative to: at most every value that the shader can return.
+double range_origin(const FieldStatistics& statistics, Storage storage, StorageScale scale);
+
+/// The range of everything that fetch_field may return for values stored in this format, in
+/// 32 bits: distances of minimum (lower half) and maximum (upper half) from the origin as the
+/// upper halves of floats, rounded outwards. 8 bits of mantissa and of exponent, so that
+/// skipping works for fields of any magnitude. decode_range() in contract.glsl reads it.
+std::uint32_t encode_range(ValueRange range, double origin, Storage storage, StorageScale scale);
+
+/// The same of field number `number` of a structure; kVacantRange where the range is empty.
+std::uint32_t encode_range(const EncodedField& field, int number, ValueRange range);
+
+/// Coded ranges of the fields beside the first, as fetch_range() reads them: those of a region side by side. Without data, and
+/// without bytes, where the scene needs none (SceneNeeds::field_ranges).
+class MoreRanges {
+ public:
+  static std::int64_t bytes(const BuildRequest& request, std::int64_t regions);
+  /// `name`: of the buffer in the encoding's GLSL. Throws UnsupportedError where it passes the context's limit.
+  MoreRanges(const Encoding& encoding, const BuildRequest& request, const std::string& name, std::int64_t regions);
+  bool needed() const { return !buffer_.data.empty(); }
+  /// For threads that have regions of their own. Nothing where no ranges are needed, or where `number` is 0.
+  void set(const EncodedField& field, std::int64_t region, int number, ValueRange range);
+  /// Moves the buffer to the field's, where there is one.
+  void move_to(EncodedField& field);
+
+ private:
+  int fields_;
+  HostTexture buffer_;
+};
+
+/// Stores `count` values side by side from texel `first`; NaN is stored as 0.
+void store_values(Storage storage, StorageScale scale, const double* values, std::size_t count, std::byte* data,
+                  std::size_t first);
+
+/// An allocated, zeroed texture or buffer.
+HostTexture make_texture(std::string name, TexelFormat format, const Vec3i& size);
+HostTexture make_buffer(std::string name, TexelFormat format, std::int64_t elements);
+
+/// Writes a box as two times four words: lower corner and `fourth`, upper corner and `eighth`.
+void write_box(const Box& box, std::uint32_t fourth, std::uint32_t eighth, std::uint32_t* words);
+
+/// What a border of one cell around each brick would take in all fields. Bricks have their `cells` (a Box).
+template <class Bricks>
+LeftOut border_left_out(const Bricks& bricks, std::string why, const BuildRequest& request) {
+  std::int64_t texels = 0;
+  for (const auto& brick : bricks) texels += brick.cells.grown(1).cells() - brick.cells.cells();
+  return {"border layer", std::move(why), texels * request.field_count() * texel_bytes(request.storage), Part::border};
+}
+
+/// Words of 32 bits for `bits` bits.
+constexpr std::int64_t words_for_bits(std::int64_t bits) { return (bits + 31) / 32; }
+inline void set_bit(std::uint32_t* words, std::int64_t bit) { words[bit / 32] |= 1U << (bit % 32); }
+
+/// Does every refinement ratio equal a power of two?
+bool power_of_two_ratios(const AmrHierarchy& hierarchy);
+
+/// Can nothing with a value in `range` be seen? The rule by which shaders skip regions (transfer_visible), on the
+/// coded range. An empty range has nothing to see; without intervals in `needs` all else is visible.
+bool hidden(const SceneNeeds& needs, ValueRange range, double origin, Storage storage, StorageScale scale);
+
+/// Must an encoding of the request's fields keep validity bits? One field with missing cells is enough, or a scene
+/// that asks for them.
+bool any_missing(const AmrHierarchy& hierarchy, const BuildRequest& request);
+
+/// What the built field is filtered by: `nearest` and r64f know no hardware filter.
+Filtering stored_filtering(const BuildRequest& request);
+
+/// Fields of EncodedField that are filled in the same way for every encoding.
+EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request,
+                         const Json& parameters);
+
+/// Reads an integer parameter. Throws UsageError naming what is accepted.
+int integer_parameter(const Encoding& encoding, const Json& parameters, std::string_view name);
+
+}  // namespace amrtex

@@ -1,0 +1,30 @@
+// The part of a generator specification that analytic fields and meshes share.
+#pragma once
+
+#include <string>
+
+#include "structures/generators/spec_reader.hpp"
+#include "structures/generators/synthetic.hpp"
+
+namespace amrtex {
+
+/// The domain in world space.
+struct WorldBox {
+  Vec3d lower{0};
+  Vec3d upper{1};
+
+  Vec3d extent() const { return upper - lower; }
+  Vec3d middle() const { return at(Vec3d(0.5)); }
+  /// Point at fractions of the edges; (0,0,0) is the lower corner.
+  Vec3d at(const Vec3d& fraction) const { return lower + extent() * fraction; }
+  /// The shortest edge, world: what default lengths are relative to.
+  double edge() const { return std::min({extent().x, extent().y, extent().z}); }
+};
+
+/// Reads the key `domain`.
+WorldBox read_domain(SpecReader& specification);
+
+/// Type of the field of a specification: "blobs_shell" when it names none.
+std::string analytic_field_type(const Json& specification);
+
+}  // namespace amrtex

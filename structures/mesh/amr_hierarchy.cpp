@@ -1,0 +1,494 @@
+#include "structures/mesh/amr_hierarchy.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <tbb/parallel_for.h>
+#include <xxhash.h>
+
+#include <cmath>
+#include <utility>
+
+namespace amrtex {
+namespace {
+
+constexpr int kMaxLevels = 64;
+constexpr std::int64_t kMaxIndex = std::numeric_limits<std::int32_t>::max();
+
+std::string text(const Vec3i& v) { return fmt::format("({}, {}, {})", v.x, v.y, v.z); }
+std::string text(const Box& b) { return fmt::format("[{}, {})", text(b.lower), text(b.upper)); }
+
+/// Patches of one level by bins over their common bounding box: constant-time look-up.
+class PatchIndex {
+ public:
+  explicit PatchIndex(std::span<const Patch> patches) {
+    if (patches.empty()) return;
+    bounds_ = patches[0].box;
+    double edges = 0;
+    for (const Patch& p : patches) {
+      bounds_ = {glm::min(bounds_.lower, p.box.lower), glm::max(bounds_.upper, p.box.upper)};
+      edges += std::cbrt(static_cast<double>(p.box.cells()));
+    }
+    bin_ = std::max(1, static_cast<int>(edges / static_cast<double>(patches.size())));
+    while (too_many_bins(patches)) bin_ *= 2;
+    fill(patches);
+  }
+
+  template <class F>
+  void for_candidates(const Box& box, F&& f) const {
+    const Box inside = intersection(box, bounds_);
+    if (inside.empty()) return;
+    const Box bins = inside.shifted(-bounds_.lower).coarsened(bin_);
+    for_each_cell(bins, [&](const Vec3i& b) {
+      const std::size_t i = Box{Vec3i(0), bins_}.offset(b);
+      for (std::uint32_t k = first_[i]; k < first_[i + 1]; ++k) f(patch_[k]);
+    });
+  }
+
+  int find(std::span<const Patch> patches, const Vec3i& cell) const {
+    if (!bounds_.contains(cell)) return -1;
+    const std::size_t i = Box{Vec3i(0), bins_}.offset((cell - bounds_.lower) / bin_);
+    for (std::uint32_t k = first_[i]; k < first_[i + 1]; ++k)
+      if (patches[static_cast<std::size_t>(patch_[k])].box.contains(cell)) return patch_[k];
+    return -1;
+  }
+
+ private:
+  Box bins_of(const Box& box) const { return box.shifted(-bounds_.lower).coarsened(bin_); }
+
+  bool too_many_bins(std::span<const Patch> patches) {
+    bins_ = ceil_div(bounds_.size(), bin_);
+    if (Box{Vec3i(0), bins_}.cells() > (std::int64_t{1} << 22)) return true;
+    std::int64_t entries = 0;
+    for (const Patch& p : patches) entries += bins_of(p.box).cells();
+    return entries > 16 * static_cast<std::int64_t>(patches.size()) + 4096;
+  }
+
+  void fill(std::span<const Patch> patches) {
+    const Box all{Vec3i(0), bins_};
+    first_.assign(static_cast<std::size_t>(all.cells()) + 1, 0);
+    for (const Patch& p : patches) for_each_cell(bins_of(p.box), [&](const Vec3i& b) { ++first_[all.offset(b) + 1]; });
+    for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
+    patch_.resize(first_.back());
+    std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+    for (std::size_t k = 0; k < patches.size(); ++k)
+      for_each_cell(bins_of(patches[k].box), [&](const Vec3i& b) { patch_[next[all.offset(b)]++] = static_cast<int>(k); });
+  }
+
+  Box bounds_;
+  Vec3i bins_{0};
+  int bin_ = 1;
+  std::vector<std::uint32_t> first_;
+  std::vector<int> patch_;
+};
+
+struct Mean {
+  double sum = 0;
+  double weight = 0;  ///< share of the cell that has a value, summed over what was added
+};
+
+}  // namespace
+
+struct AmrHierarchy::Data {
+  MeshDescription mesh;
+  std::vector<Vec3i> cells;                                  // a level
+  std::vector<int> width;                                    // a level, in finest cells
+  std::vector<PatchIndex> index;                             // a level
+  std::vector<std::vector<std::vector<std::uint8_t>>> leaf;  // level, patch, cell
+  // level, patch, field, cell: share of a refined cell that has a value; only where it is not 0 or 1 for some cell
+  std::vector<std::vector<std::vector<std::vector<double>>>> weight;
+  std::vector<std::int64_t> leaves;  // a level
+  std::vector<FieldStatistics> statistics;
+  bool holes = false;
+
+  int levels() const { return static_cast<int>(mesh.levels.size()); }
+  const std::vector<Patch>& patches(int level) const { return mesh.levels[static_cast<std::size_t>(level)]; }
+  std::vector<Patch>& patches(int level) { return mesh.levels[static_cast<std::size_t>(level)]; }
+  const PatchIndex& at(int level) const { return index[static_cast<std::size_t>(level)]; }
+  int width_of(int level) const { return width[static_cast<std::size_t>(level)]; }
+  /// Cells of `fine` a cell of `coarse`, along an axis.
+  int ratio(int coarse, int fine) const { return width_of(coarse) / width_of(fine); }
+
+  [[noreturn]] void refuse(const std::string& what) const { throw Error(fmt::format("data set {}: {}", mesh.name, what)); }
+
+  std::vector<int> patches_in(int level, const Box& box) const {
+    std::vector<int> found;
+    const auto& list = patches(level);
+    at(level).for_candidates(box, [&](int k) {
+      if (overlap(list[static_cast<std::size_t>(k)].box, box)) found.push_back(k);
+    });
+    std::sort(found.begin(), found.end());
+    found.erase(std::unique(found.begin(), found.end()), found.end());
+    return found;
+  }
+
+  void check_levels();
+  void check_patches(int level) const;
+  void mark_leaves(int level);
+  bool fully_refined(int level, const Vec3i& cell) const;
+  void restrict_level(int level);
+  void restrict_patch(int level, std::size_t patch, std::size_t field);
+  Mean mean_of_leaves(int level, const Vec3i& cell, std::size_t field) const;
+  void drop_non_finite();
+  void count();
+  FieldStatistics measure(std::size_t field) const;
+};
+
+void AmrHierarchy::Data::check_levels() {
+  if (mesh.levels.empty()) refuse("no level");
+  if (levels() > kMaxLevels) refuse(fmt::format("{} levels; at most {} are supported", levels(), kMaxLevels));
+  if (mesh.ratios.size() + 1 != mesh.levels.size())
+    refuse(fmt::format("{} levels need {} refinement ratios, {} given", levels(), levels() - 1, mesh.ratios.size()));
+  if (glm::any(glm::lessThan(mesh.root_cells, Vec3i(1)))) refuse(fmt::format("a root domain of {} cells", text(mesh.root_cells)));
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(mesh.domain_upper[axis] > mesh.domain_lower[axis]) || !std::isfinite(mesh.domain_upper[axis] - mesh.domain_lower[axis]))
+      refuse(fmt::format("the domain's corners along axis {} are {} and {}; the upper one must be larger", "xyz"[axis],
+                         mesh.domain_lower[axis], mesh.domain_upper[axis]));
+  std::int64_t finest = std::max({mesh.root_cells.x, mesh.root_cells.y, mesh.root_cells.z});
+  for (std::size_t l = 0; l < mesh.ratios.size(); ++l) {
+    if (mesh.ratios[l] < 2)
+      refuse(fmt::format("the refinement ratio from level {} to {} is {}; at least 2 is needed", l, l + 1, mesh.ratios[l]));
+    finest *= mesh.ratios[l];
+    if (finest > kMaxIndex)
+      refuse(fmt::format("level {} has {} cells along an axis; at most {} (31 bits of index) are supported", l + 1, finest,
+                         kMaxIndex));
+  }
+  cells.assign(mesh.levels.size(), mesh.root_cells);
+  width.assign(mesh.levels.size(), 1);
+  for (std::size_t l = 1; l < cells.size(); ++l) cells[l] = cells[l - 1] * mesh.ratios[l - 1];
+  for (std::size_t l = cells.size() - 1; l > 0; --l) width[l - 1] = width[l] * mesh.ratios[l - 1];
+}
+
+void AmrHierarchy::Data::check_patches(int level) const {
+  const auto& list = patches(level);
+  const Box domain{Vec3i(0), cells[static_cast<std::size_t>(level)]};
+  for (std::size_t k = 0; k < list.size(); ++k) {
+    const Box& box = list[k].box;
+    if (box.empty()) refuse(fmt::format("level {}, patch {}: the box {} is empty", level, k, text(box)));
+    if (!domain.contains(box))
+      refuse(fmt::format("level {}, patch {}: the box {} lies outside its level, {}", level, k, text(box), text(domain)));
+    if (list[k].values.size() != mesh.fields.size())
+      refuse(fmt::format("level {}, patch {}: {} arrays for {} fields", level, k, list[k].values.size(), mesh.fields.size()));
+    for (const auto& values : list[k].values)
+      if (static_cast<std::int64_t>(values.size()) != box.cells())
+        refuse(fmt::format("level {}, patch {}: {} values for {} cells", level, k, values.size(), box.cells()));
+    if (level > 0) {
+      const int r = mesh.ratios[static_cast<std::size_t>(level - 1)];
+      if (box.coarsened(r).refined(r) != box)
+        refuse(fmt::format("level {}, patch {}: the box {} does not align with the cells of level {} (refinement ratio {})",
+                           level, k, text(box), level - 1, r));
+    }
+  }
+  for (std::size_t k = 0; k < list.size(); ++k)
+    for (int other : patches_in(level, list[k].box))
+      if (static_cast<std::size_t>(other) > k)
+        refuse(fmt::format("level {}: patches {} {} and {} {} overlap", level, k, text(list[k].box), other,
+                           text(list[static_cast<std::size_t>(other)].box)));
+}
+
+/// Is every part of the cell covered by patches of finer levels?
+bool AmrHierarchy::Data::fully_refined(int level, const Vec3i& cell) const {
+  if (level + 1 >= levels()) return false;
+  const Box children = Box{cell, cell + Vec3i(1)}.refined(ratio(level, level + 1));
+  bool full = true;
+  for_each_cell(children, [&](const Vec3i& child) {
+    if (full && at(level + 1).find(patches(level + 1), child) < 0) full = fully_refined(level + 1, child);
+  });
+  return full;
+}
+
+void AmrHierarchy::Data::mark_leaves(int level) {
+  auto& masks = leaf[static_cast<std::size_t>(level)];
+  masks.resize(patches(level).size());
+  tbb::parallel_for(std::size_t{0}, masks.size(), [&](std::size_t k) {
+    const Box& box = patches(level)[k].box;
+    masks[k].assign(static_cast<std::size_t>(box.cells()), 1);
+    for (int finer = level + 1; finer < levels(); ++finer) {
+      const int r = ratio(level, finer);
+      for (int other : patches_in(finer, box.refined(r))) {
+        const Box& fine = patches(finer)[static_cast<std::size_t>(other)].box;
+        const Box covered = fine.coarsened(r);
+        const bool aligned = covered.refined(r) == fine;
+        for_each_cell(intersection(covered, box), [&](const Vec3i& cell) {
+          if (!aligned && !fine.contains(Box{cell, cell + Vec3i(1)}.refined(r)) && !fully_refined(level, cell))
+            refuse(fmt::format("level {}, patch {}: cell {} is refined only in part, by level {}, patch {}", level, k, text(cell),
+                               finer, other));
+          masks[k][box.offset(cell)] = 0;
+        });
+      }
+    }
+  });
+}
+
+void AmrHierarchy::Data::drop_non_finite() {
+  for (auto& level : mesh.levels)
+    for (Patch& patch : level)
+      for (auto& values : patch.values)
+        for (double& v : values)
+          if (!std::isfinite(v)) v = std::numeric_limits<double>::quiet_NaN();
+}
+
+Mean AmrHierarchy::Data::mean_of_leaves(int level, const Vec3i& cell, std::size_t field) const {
+  Mean mean;
+  for (int finer = level + 1; finer < levels(); ++finer) {
+    const int r = ratio(level, finer);
+    const double share = 1.0 / (static_cast<double>(r) * r * r);
+    const Box inside = Box{cell, cell + Vec3i(1)}.refined(r);
+    for (int k : patches_in(finer, inside)) {
+      const Patch& patch = patches(finer)[static_cast<std::size_t>(k)];
+      const auto& mask = leaf[static_cast<std::size_t>(finer)][static_cast<std::size_t>(k)];
+      for_each_cell(intersection(patch.box, inside), [&](const Vec3i& c) {
+        const std::size_t i = patch.box.offset(c);
+        const double v = patch.values[field][i];
+        if (mask[i] == 0 || std::isnan(v)) return;
+        mean.sum += v * share;
+        mean.weight += share;
+      });
+    }
+  }
+  return mean;
+}
+
+void AmrHierarchy::Data::restrict_patch(int level, std::size_t k, std::size_t field) {
+  Patch& patch = patches(level)[k];
+  const auto& mask = leaf[static_cast<std::size_t>(level)][k];
+  auto& values = patch.values[field];
+  std::vector<double> shares;
+  const int r = ratio(level, level + 1);
+  const double share = 1.0 / (static_cast<double>(r) * r * r);
+  const auto put = [&](std::size_t i, const Mean& mean) {
+    values[i] = mean.weight > 0 ? mean.sum / mean.weight : std::numeric_limits<double>::quiet_NaN();
+    if (mean.weight > 0 && mean.weight < 1 - 1e-9) {
+      if (shares.empty()) shares.assign(values.size(), 1.0);
+      shares[i] = mean.weight;
+    }
+  };
+  std::vector<std::uint8_t> done;
+  for (int other : patches_in(level + 1, patch.box.refined(r))) {
+    const Patch& fine = patches(level + 1)[static_cast<std::size_t>(other)];
+    const auto& fine_values = fine.values[field];
+    const auto& fine_shares = weight[static_cast<std::size_t>(level) + 1][static_cast<std::size_t>(other)][field];
+    if (done.empty()) done.assign(values.size(), 0);
+    for_each_cell(intersection(fine.box.coarsened(r), patch.box), [&](const Vec3i& cell) {
+      Mean mean;
+      for_each_cell(Box{cell, cell + Vec3i(1)}.refined(r), [&](const Vec3i& child) {
+        const std::size_t j = fine.box.offset(child);
+        if (std::isnan(fine_values[j])) return;
+        const double w = fine_shares.empty() ? share : share * fine_shares[j];
+        mean.sum += fine_values[j] * w;
+        mean.weight += w;
+      });
+      done[patch.box.offset(cell)] = 1;
+      put(patch.box.offset(cell), mean);
+    });
+  }
+  // what is refined by levels further down only
+  for_each_cell(patch.box, [&](const Vec3i& cell) {
+    const std::size_t i = patch.box.offset(cell);
+    if (mask[i] == 0 && (done.empty() || done[i] == 0)) put(i, mean_of_leaves(level, cell, field));
+  });
+  weight[static_cast<std::size_t>(level)][k][field] = std::move(shares);
+}
+
+void AmrHierarchy::Data::restrict_level(int level) {
+  weight[static_cast<std::size_t>(level)].assign(patches(level).size(), std::vector<std::vector<double>>(mesh.fields.size()));
+  if (level + 1 == levels()) return;
+  tbb::parallel_for(std::size_t{0}, patches(level).size(), [&](std::size_t k) {
+    for (std::size_t field = 0; field < mesh.fields.size(); ++field) restrict_patch(level, k, field);
+  });
+}
+
+void AmrHierarchy::Data::count() {
+  leaves.assign(mesh.levels.size(), 0);
+  double covered = 0;  // of the domain, in finest cells
+  for (std::size_t l = 0; l < mesh.levels.size(); ++l) {
+    for (const auto& mask : leaf[l])
+      for (std::uint8_t m : mask) leaves[l] += m;
+    covered += static_cast<double>(leaves[l]) * std::pow(static_cast<double>(width[l]), 3);
+  }
+  const Vec3d finest(cells.back());
+  holes = covered < finest.x * finest.y * finest.z * (1 - 1e-14);
+}
+
+FieldStatistics AmrHierarchy::Data::measure(std::size_t field) const {
+  FieldStatistics s;
+  double integral = 0;
+  double lost = 0;  // compensated: sums hold to 1e-12 over millions of cells
+  for (std::size_t l = 0; l < mesh.levels.size(); ++l) {
+    const Vec3d h = (mesh.domain_upper - mesh.domain_lower) / Vec3d(cells[l]);
+    double sum = 0;
+    double comp = 0;
+    for (std::size_t k = 0; k < mesh.levels[l].size(); ++k) {
+      const auto& values = mesh.levels[l][k].values[field];
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        if (leaf[l][k][i] == 0) continue;
+        const double v = values[i];
+        if (std::isnan(v)) {
+          ++s.cells_without_value;
+          continue;
+        }
+        s.min = std::isnan(s.min) ? v : std::min(s.min, v);
+        s.max = std::isnan(s.max) ? v : std::max(s.max, v);
+        const double y = v - comp;
+        const double t = sum + y;
+        comp = (t - sum) - y;
+        sum = t;
+      }
+    }
+    const double y = sum * (h.x * h.y * h.z) - lost;
+    const double t = integral + y;
+    lost = (t - integral) - y;
+    integral = t;
+  }
+  s.volume_integral = integral;
+  return s;
+}
+
+AmrHierarchy::AmrHierarchy(MeshDescription description) : data_(std::make_unique<Data>()) {
+  Data& d = *data_;
+  d.mesh = std::move(description);
+  d.check_levels();
+  for (const auto& level : d.mesh.levels) d.index.emplace_back(level);
+  for (int l = 0; l < d.levels(); ++l) d.check_patches(l);
+  std::int64_t stored = 0;
+  for (int l = 0; l < d.levels(); ++l) stored += stored_cells(l);
+  if (stored == 0) d.refuse("no cell");
+  d.leaf.resize(d.mesh.levels.size());
+  d.weight.resize(d.mesh.levels.size());
+  for (int l = 0; l < d.levels(); ++l) d.mark_leaves(l);
+  d.drop_non_finite();
+  for (int l = d.levels() - 1; l >= 0; --l) d.restrict_level(l);
+  d.count();
+  for (std::size_t f = 0; f < d.mesh.fields.size(); ++f) d.statistics.push_back(d.measure(f));
+}
+
+AmrHierarchy::~AmrHierarchy() = default;
+AmrHierarchy::AmrHierarchy(AmrHierarchy&&) noexcept = default;
+AmrHierarchy& AmrHierarchy::operator=(AmrHierarchy&&) noexcept = default;
+
+const std::string& AmrHierarchy::name() const { return data_->mesh.name; }
+int AmrHierarchy::level_count() const { return data_->levels(); }
+int AmrHierarchy::ratio_to_finer(int level) const {
+  return level == finest_level() ? 1 : data_->mesh.ratios[static_cast<std::size_t>(level)];
+}
+int AmrHierarchy::cell_width(int level) const { return data_->width_of(level); }
+Vec3i AmrHierarchy::cells(int level) const { return data_->cells[static_cast<std::size_t>(level)]; }
+Vec3d AmrHierarchy::domain_lower() const { return data_->mesh.domain_lower; }
+Vec3d AmrHierarchy::domain_upper() const { return data_->mesh.domain_upper; }
+Vec3d AmrHierarchy::spacing(int level) const { return (domain_upper() - domain_lower()) / Vec3d(cells(level)); }
+std::array<bool, 3> AmrHierarchy::periodic() const { return data_->mesh.periodic; }
+const std::vector<std::string>& AmrHierarchy::fields() const { return data_->mesh.fields; }
+
+int AmrHierarchy::field_index(const std::string& field) const {
+  const auto& all = fields();
+  const auto it = std::find(all.begin(), all.end(), field);
+  if (it == all.end())
+    throw UsageError(fmt::format("data set {}: no field '{}'; its fields are {}", name(), field, fmt::join(all, ", ")));
+  return static_cast<int>(it - all.begin());
+}
+
+std::span<const Patch> AmrHierarchy::patches(int level) const { return data_->patches(level); }
+int AmrHierarchy::find_patch(int level, const Vec3i& cell) const { return data_->at(level).find(data_->patches(level), cell); }
+std::vector<int> AmrHierarchy::patches_in(int level, const Box& box) const { return data_->patches_in(level, box); }
+std::span<const std::uint8_t> AmrHierarchy::leaf_mask(int level, int patch) const {
+  return data_->leaf[static_cast<std::size_t>(level)][static_cast<std::size_t>(patch)];
+}
+
+bool AmrHierarchy::refined_within(int level, const Box& box) const {
+  for (int finer = level + 1; finer < level_count(); ++finer) {
+    const Box fine = box.refined(data_->ratio(level, finer));
+    const auto& list = data_->patches(finer);
+    bool found = false;
+    data_->at(finer).for_candidates(fine, [&](int k) { found = found || overlap(list[static_cast<std::size_t>(k)].box, fine); });
+    if (found) return true;
+  }
+  return false;
+}
+
+std::optional<LeafCell> AmrHierarchy::find_leaf(const Vec3i& finest_cell) const {
+  if (!domain(finest_level()).contains(finest_cell)) return std::nullopt;
+  for (int level = finest_level(); level >= 0; --level) {
+    const Vec3i cell = finest_cell / cell_width(level);
+    const int patch = find_patch(level, cell);
+    if (patch >= 0) return LeafCell{level, patch, cell};
+  }
+  return std::nullopt;
+}
+
+double AmrHierarchy::value(const LeafCell& leaf, int field) const {
+  const Patch& patch = data_->patches(leaf.level)[static_cast<std::size_t>(leaf.patch)];
+  return patch.values[static_cast<std::size_t>(field)][patch.box.offset(leaf.cell)];
+}
+
+double AmrHierarchy::level_value(int level, const Vec3i& cell, int field) const {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  if (!domain(level).contains(cell)) return kNone;
+  const int own = find_patch(level, cell);
+  if (own >= 0) return value({level, own, cell}, field);
+  if (refined_within(level, Box{cell, cell + Vec3i(1)})) {
+    const Mean mean = data_->mean_of_leaves(level, cell, static_cast<std::size_t>(field));
+    return mean.weight > 0 ? mean.sum / mean.weight : kNone;
+  }
+  for (int coarser = level - 1; coarser >= 0; --coarser) {
+    const Vec3i parent = cell / data_->ratio(coarser, level);
+    const int patch = find_patch(coarser, parent);
+    if (patch >= 0) return value({coarser, patch, parent}, field);
+  }
+  return kNone;
+}
+
+std::int64_t AmrHierarchy::leaf_cells(int level) const { return data_->leaves[static_cast<std::size_t>(level)]; }
+std::int64_t AmrHierarchy::leaf_cells() const {
+  std::int64_t n = 0;
+  for (int l = 0; l < level_count(); ++l) n += leaf_cells(l);
+  return n;
+}
+std::int64_t AmrHierarchy::stored_cells(int level) const {
+  std::int64_t n = 0;
+  for (const Patch& p : data_->patches(level)) n += p.box.cells();
+  return n;
+}
+std::int64_t AmrHierarchy::stored_cells() const {
+  std::int64_t n = 0;
+  for (int l = 0; l < level_count(); ++l) n += stored_cells(l);
+  return n;
+}
+bool AmrHierarchy::has_holes() const { return data_->holes; }
+const FieldStatistics& AmrHierarchy::statistics(int field) const { return data_->statistics[static_cast<std::size_t>(field)]; }
+
+std::string AmrHierarchy::content_hash(int field) const {
+  struct Key {
+    std::int32_t x, y, z, width;
+    float value;
+  };
+  static_assert(sizeof(Key) == 20);
+  const Data& d = *data_;
+  int finest = finest_level();
+  while (finest > 0 && leaf_cells(finest) == 0) --finest;
+  const auto for_leaves = [&](auto&& f) {
+    for (int l = 0; l <= finest; ++l)
+      for (std::size_t k = 0; k < d.patches(l).size(); ++k) {
+        const Patch& patch = d.patches(l)[k];
+        const auto& mask = d.leaf[static_cast<std::size_t>(l)][k];
+        std::size_t i = 0;
+        for_each_cell(patch.box, [&](const Vec3i& c) {
+          if (mask[i] != 0) f(c * d.ratio(l, finest), d.ratio(l, finest), patch.values[static_cast<std::size_t>(field)][i]);
+          ++i;
+        });
+      }
+  };
+  Vec3i corner(std::numeric_limits<int>::max());
+  for_leaves([&](const Vec3i& c, int, double) { corner = glm::min(corner, c); });
+  std::uint64_t low = 0;
+  std::uint64_t high = 0;
+  for_leaves([&](const Vec3i& c, int w, double v) {
+    const Vec3i at = c - corner;
+    const float rounded = std::isnan(v) ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(v) + 0.0F;  // -0 is 0
+    const Key key{at.x, at.y, at.z, w, rounded};
+    const XXH128_hash_t h = XXH3_128bits(&key, sizeof key);
+    low += h.low64;  // a sum, since the order of cells must not matter
+    high += h.high64;
+  });
+  return fmt::format("{:016x}{:016x}", high, low);
+}
+
+}  // namespace amrtex

@@ -1,0 +1,22 @@
+// AMReX plotfiles (a folder with `Header` and `Level_<l>/Cell_H`, `Cell_D_*`).
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "structures/mesh/amr_hierarchy.hpp"
+
+namespace amrtex {
+
+/// True when the folder looks like a plotfile.
+bool is_amrex_plotfile(const std::filesystem::path& path);
+
+/// Reads these fields, or all when none is given.
+MeshDescription read_amrex_plotfile(const std::filesystem::path& path, const std::vector<std::string>& fields);
+
+/// Writes float64 FABs, little endian, Cell_H version 1, one data file a level, into
+/// a folder that must not exist yet; nothing is left behind on failure.
+void write_amrex_plotfile(const AmrHierarchy& hierarchy, const std::filesystem::path& path);
+
+}  // namespace amrtex

@@ -1,0 +1,37 @@
+#include "structures/readers/mesh_io.hpp"
+
+#include <fmt/format.h>
+
+#include "structures/readers/amrex_plotfile/amrex_plotfile.hpp"
+
+namespace amrtex {
+namespace {
+
+struct Format {
+  const char* name;  ///< for messages
+  bool (*probe)(const std::filesystem::path& path);
+  MeshDescription (*read)(const std::filesystem::path& path, const std::vector<std::string>& fields);
+};
+
+/// One line a format; the first whose probe says yes reads.
+constexpr Format kFormats[] = {
+    {"AMReX plotfile (a folder with a file `Header`)", is_amrex_plotfile, read_amrex_plotfile},
+};
+
+std::string known_formats() {
+  std::string names;
+  for (const Format& format : kFormats) names += (names.empty() ? "" : ", ") + std::string(format.name);
+  return names;
+}
+
+}  // namespace
+
+MeshDescription read_mesh(const std::filesystem::path& path, const std::vector<std::string>& fields) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored)) throw Error(fmt::format("{}: no such file or folder", path.string()));
+  for (const Format& format : kFormats)
+    if (format.probe(path)) return format.read(path, fields);
+  throw Error(fmt::format("{}: not in a format that can be read: {}", path.string(), known_formats()));
+}
+
+}  // namespace amrtex

@@ -1,0 +1,158 @@
+// What readers of text formats share: the name of a data set, loading a text file
+// of bounded size, and a scanner whose errors name the file and the line.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "structures/mesh/error.hpp"
+
+namespace amrtex {
+
+/// Larger text files are refused: 1 GiB holds the boxes of some ten million patches.
+inline constexpr std::uint64_t kMaxTextBytes = std::uint64_t{1} << 30;
+
+/// Name of a data set for tables: the path's last two components, or the last one where there is no named parent.
+inline std::string dataset_name(const std::filesystem::path& path) {
+  std::filesystem::path clean = path.lexically_normal();
+  if (clean.filename().empty()) clean = clean.parent_path();  // "a/b/" has an empty file name
+  if (clean.empty() || clean.filename() == "." || clean.filename() == "..") {
+    clean = std::filesystem::absolute(path).lexically_normal();
+    if (clean.filename().empty()) clean = clean.parent_path();
+  }
+  const std::string parent = clean.parent_path().filename().string();
+  const bool named = !parent.empty() && parent != "." && parent != ".." && parent != "/";
+  return named ? parent + "/" + clean.filename().string() : clean.filename().string();
+}
+
+/// Size in bytes of a regular file, or an Error that names it. Devices and pipes are no data files.
+inline std::uint64_t regular_file_size(const std::filesystem::path& path) {
+  std::error_code failure;
+  const auto status = std::filesystem::status(path, failure);
+  if (!std::filesystem::exists(status)) throw Error(fmt::format("{}: no such file", path.string()));
+  if (!std::filesystem::is_regular_file(status)) throw Error(fmt::format("{}: not a regular file", path.string()));
+  const auto size = std::filesystem::file_size(path, failure);
+  if (failure) throw Error(fmt::format("{}: {}", path.string(), failure.message()));
+  return size;
+}
+
+/// The whole text of a file of at most `max_bytes`.
+inline std::string load_text(const std::filesystem::path& path, std::uint64_t max_bytes = kMaxTextBytes) {
+  const std::uint64_t size = regular_file_size(path);
+  if (size > max_bytes) throw Error(fmt::format("{}: {} bytes of text; at most {} are read", path.string(), size, max_bytes));
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw Error(fmt::format("{}: cannot be opened for reading", path.string()));
+  std::string text(static_cast<std::size_t>(size), '\0');
+  in.read(text.data(), static_cast<std::streamsize>(size));
+  if (static_cast<std::uint64_t>(in.gcount()) != size)
+    throw Error(fmt::format("{}: only {} of {} bytes could be read", path.string(), in.gcount(), size));
+  return text;
+}
+
+/// Walks over a text. Every failure is an Error "<where>, line <n>: <what>".
+class TextScanner {
+ public:
+  /// `where` names the file; `count_lines` is off where a line number would mean nothing.
+  TextScanner(std::string where, std::string text, bool count_lines = true)
+      : where_(std::move(where)), text_(std::move(text)), count_lines_(count_lines) {}
+
+  [[noreturn]] void fail(const std::string& what) const {
+    if (!count_lines_) throw Error(fmt::format("{}: {}", where_, what));
+    const auto end = text_.begin() + static_cast<std::ptrdiff_t>(std::min(start_, text_.size()));
+    throw Error(fmt::format("{}, line {}: {}", where_, 1 + std::count(text_.begin(), end, '\n'), what));
+  }
+
+  /// Bytes that have not been read yet: an upper bound for every count of things that follow.
+  std::int64_t remaining() const { return static_cast<std::int64_t>(text_.size() - at_); }
+  std::size_t position() const { return at_; }
+
+  /// The next character that is no white space, unread; NUL at the end.
+  char peek() {
+    skip_space();
+    return at_ < text_.size() ? text_[at_] : '\0';
+  }
+
+  /// The rest of the line, without its end and without white space around it.
+  std::string line(std::string_view what) {
+    start_ = at_;
+    if (at_ >= text_.size()) fail_expected(what);
+    const std::size_t end = std::min(text_.find('\n', at_), text_.size());
+    std::string found = text_.substr(at_, end - at_);
+    at_ = std::min(end + 1, text_.size());
+    const auto first = found.find_first_not_of(kSpace);
+    if (first == std::string::npos) return {};
+    return found.substr(first, found.find_last_not_of(kSpace) - first + 1);
+  }
+
+  /// Characters up to the next white space.
+  std::string token(std::string_view what) {
+    skip_space();
+    start_ = at_;
+    const std::size_t end = std::min(text_.find_first_of(kSpace, at_), text_.size());
+    if (end == at_) fail_expected(what);
+    std::string found = text_.substr(at_, end - at_);
+    at_ = end;
+    return found;
+  }
+
+  void expect(std::string_view literal, std::string_view what) {
+    skip_space();
+    start_ = at_;
+    if (std::string_view(text_).substr(at_, literal.size()) != literal) fail_expected(fmt::format("'{}' of {}", literal, what));
+    at_ += literal.size();
+  }
+
+  /// A decimal integer from `lowest` to `highest`.
+  std::int64_t integer(std::string_view what, std::int64_t lowest, std::int64_t highest) {
+    skip_space();
+    start_ = at_;
+    std::int64_t value = 0;
+    const char* begin = text_.data() + at_;
+    const auto [end, failure] = std::from_chars(begin, text_.data() + text_.size(), value);
+    if (failure != std::errc() || value < lowest || value > highest)
+      fail_expected(fmt::format("{}, a whole number from {} to {}", what, lowest, highest));
+    at_ += static_cast<std::size_t>(end - begin);
+    return value;
+  }
+
+  double real(std::string_view what) {
+    skip_space();
+    start_ = at_;
+    double value = 0;
+    const char* begin = text_.data() + at_;
+    const auto [end, failure] = std::from_chars(begin, text_.data() + text_.size(), value);
+    if (failure == std::errc::invalid_argument) fail_expected(fmt::format("{}, a number", what));
+    at_ += static_cast<std::size_t>(end - begin);
+    return value;
+  }
+
+ private:
+  static constexpr const char* kSpace = " \t\r\n\v\f";
+
+  void skip_space() { at_ = std::min(text_.find_first_not_of(kSpace, at_), text_.size()); }
+
+  [[noreturn]] void fail_expected(std::string_view what) const {
+    if (start_ >= text_.size()) fail(fmt::format("the text ends here; expected {}", what));
+    std::string found = text_.substr(start_, std::min<std::size_t>(text_.find_first_of(kSpace, start_) - start_, 40));
+    for (char& c : found)
+      if (c < ' ' || c > '~') c = '?';
+    fail(fmt::format("expected {}; found '{}'", what, found));
+  }
+
+  std::string where_;
+  std::string text_;
+  bool count_lines_;
+  std::size_t at_ = 0;
+  std::size_t start_ = 0;  ///< of what is being read, for the line number of an error
+};
+
+}  // namespace amrtex
