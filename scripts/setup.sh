@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Installs what amrtex needs from the distribution's packages, and nothing else.
+# Installs what amrtex needs from the distribution's packages, and nothing else; with --full also what only some checks
+# need, without which tests skip themselves and say so.
 # Debian 12: Mesa comes from bookworm-backports, because 22.3 has no bindless
 # textures and marches 1.2-1.5 times slower; Debian 13 and Ubuntu 24.04 have a
 # new enough Mesa as stock. Runs as root or with sudo; does nothing when all is there.
@@ -8,6 +9,14 @@ set -euo pipefail
 packages=(g++ cmake ninja-build pkg-config python3 python3-glad
           libegl-dev libgl-dev libglm-dev libtbb-dev nlohmann-json3-dev libfmt-dev libspdlog-dev
           libassimp-dev libcli11-dev libpng-dev libxxhash-dev libgtest-dev libgmock-dev libbenchmark-dev librapidcheck-dev)
+# a browser, LaTeX, a second reader of what we write, engines of clusters, a bare root of another distribution
+optional=(chromium texlive-latex-recommended texlive-latex-extra python3-h5py python3-yt paraview python3-paraview
+          snakemake slurm-wlm mmdebstrap)
+case ${1:-} in
+  '') ;;
+  --full) packages+=("${optional[@]}") ;;
+  *) echo "scripts/setup.sh: no argument '$1'; accepted: --full" >&2; exit 2 ;;
+esac
 mesa=(libgl1-mesa-dri libegl-mesa0 libglx-mesa0 mesa-vulkan-drivers libvulkan1 libgbm1)
 # Mesa 25.1 dropped OSMesa; where a distribution has no package, the EGL path alone remains.
 osmesa=libosmesa6-dev

@@ -313,9 +313,9 @@ Json blank_record(Status status, std::string_view reason) {
   return record;
 }
 
-const Json& value_at(const Json& json, const std::string& pointer) {
+const Json& value_at(const Json& json, std::string_view pointer) {
   static const Json null;
-  const Json::json_pointer p(pointer);
+  const Json::json_pointer p{std::string(pointer)};
   return json.contains(p) ? json.at(p) : null;
 }
 

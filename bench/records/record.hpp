@@ -21,7 +21,7 @@ std::string_view status_name(Status status);
 Json blank_record(Status status, std::string_view reason = "");
 
 /// The value at a JSON pointer such as /frame/wall_ms/median; null where it, or something above it, is not there.
-const Json& value_at(const Json& json, const std::string& pointer);
+const Json& value_at(const Json& json, std::string_view pointer);
 
 /// Parts of records. Times in milliseconds.
 Json timing_json(std::span<const double> samples_ms);  ///< {"median", "mad", "ci95", "min", "n"}; null without samples
