@@ -19,21 +19,26 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 COLOUR = {"uniform": "#4c566a", "page_table": "#1f77b4", "octree": "#2e8b3d", "kd_tree": "#d1432b", "exabricks": "#8a5fbf"}
 LEVEL = ["#9aa3b2", "#e08a2e", "#c0392b"]
 
-# The small mesh of the pictures of structures and samples: a shell that crosses 3 levels of 4, 8 and 16 cells a unit.
-SMALL_MESH = {"field": {"type": "shell", "center": [0.1, 0.1, 0.25], "radius": 0.62, "width": 0.07, "amplitude": 1},
-              "levels": 3, "root": [8, 8, 4], "patch": 4, "max_patch": 16,
-              "domain": {"lower": [0, 0, 0], "upper": [1, 1, 0.5]}, "refine": {"criterion": "gradient", "threshold": 0.2}}
-# One level jump of ratio 4 along x, seen by every filter.
-JUMP_MESH = {"field": {"type": "shell", "center": [-20, 2, 2], "radius": 24.9, "width": 1.1, "amplitude": 1},
-             "levels": 2, "root": [8, 4, 4], "ratio": 4, "patch": 4,
-             "domain": {"lower": [0, 0, 0], "upper": [8, 4, 4]}, "refine": {"criterion": "value", "threshold": 0.6}}
+# What every encoding stores: a shell in a slab, on 3 levels of 8, 16 and 32 cells along its long edges.
+SMALL_MESH = {"field": {"type": "shell", "center": [0, 0, 0.125], "radius": 0.35, "width": 0.05, "amplitude": 1},
+              "levels": 3, "root": [8, 8, 2], "patch": 4, "max_patch": 16,
+              "domain": {"lower": [0, 0, 0], "upper": [1, 1, 0.25]}, "refine": {"criterion": "gradient", "threshold": 0.3}}
+# What a ray crosses.
+RAY_MESH = {"field": {"type": "shell", "center": [0.1, 0.1, 0.25], "radius": 0.62, "width": 0.07, "amplitude": 1},
+            "levels": 3, "root": [8, 8, 4], "patch": 4, "max_patch": 16,
+            "domain": {"lower": [0, 0, 0], "upper": [1, 1, 0.5]}, "refine": {"criterion": "gradient", "threshold": 0.2}}
+# One level jump of ratio 4 along x, on each side of a bump; seen by every filter.
+JUMP_MESH = {"field": {"type": "shell", "center": [-20, 2, 2], "radius": 26.95, "width": 2.2, "amplitude": 1},
+             "levels": 2, "root": [12, 4, 4], "ratio": 4, "patch": 4,
+             "domain": {"lower": [0, 0, 0], "upper": [12, 4, 4]}, "refine": {"criterion": "value", "threshold": 0.6}}
 
 # How each encoding stores the small mesh: filter and build parameters.
-STORED = [("uniform", "linear_vertex", []), ("page_table", "linear_page", ["page_size=4"]), ("octree", "linear_lod", []),
+STORED = [("uniform", "linear_page", []), ("page_table", "linear_page", ["page_size=4"]), ("octree", "linear_lod", []),
           ("kd_tree", "linear_lod", []), ("exabricks", "basis", [])]
-# Each filter, through an encoding that has it.
-FILTERS = [("nearest", "uniform", []), ("linear_lod", "octree", []), ("linear_page", "page_table", ["page_size=4"]),
-           ("linear_vertex", "uniform", []), ("basis", "kd_tree", [])]
+# Each filter, through an encoding that has it, and what it does at a level jump.
+FILTERS = [("nearest", "uniform", [], "jumps at every face"), ("linear_lod", "octree", [], "jumps where cells change level"),
+           ("linear_page", "page_table", ["page_size=4"], "jumps where pages change level"), ("linear_vertex", "uniform", [], "continuous"),
+           ("basis", "kd_tree", [], "continuous")]
 
 
 class Program:
@@ -69,99 +74,119 @@ class Program:
 
 # ---- structures: one mesh, and what every encoding keeps of it
 
-SLICE = 8  # finest cells: the slice of the mesh that is shown
-MAP_EDGE = 150  # pixels of the slice
+MAP_EDGE = 160  # pixels of the slice of the mesh that is shown
+SHEET_WIDTH = 290  # pixels
+TEXEL = 2  # pixels
+
+
+def middle(finest):
+    """The slice of the mesh that is shown, in finest cells."""
+    return finest[2] // 2
 
 
 def draw_boxes(svg, left, top, finest, boxes, edge):
     """Boxes of finest cells that meet the slice, coarse ones first; y goes up."""
     scale = edge / finest[0]
     for b in sorted(boxes, key=lambda b: b["level"]):
-        if not b["lower"][2] <= SLICE < b["upper"][2]:
+        if not b["lower"][2] <= middle(finest) < b["upper"][2]:
             continue
         x, y = left + b["lower"][0] * scale, top + edge - b["upper"][1] * scale
         w, h = (b["upper"][0] - b["lower"][0]) * scale, (b["upper"][1] - b["lower"][1]) * scale
         svg.rect(x, y, w, h, "none", LEVEL[b["level"]], 1.2)
 
 
-def leaf_rows(structure, values):
-    """Values of the slice, one a finest cell, the top row first: those of `uniform`, whose texture is the whole domain."""
+def leaf_rows(structure):
+    """Values of the slice, one a finest cell, the top row first: those of `uniform` under `nearest`, whose texture is the domain."""
+    values = next(t["values"] for t in structure["textures"] if t["holds_values"])
     nx, ny, _ = structure["finest_cells"]
-    return [[values[(SLICE * ny + y) * nx + x] for x in range(nx)] for y in reversed(range(ny))]
+    z = middle(structure["finest_cells"])
+    return [[values[(z * ny + y) * nx + x] for x in range(nx)] for y in reversed(range(ny))]
 
 
-def texel_sheet(texture, columns):
-    """All layers of a texture side by side, `columns` texels wide: every texel is there once."""
+def layers_of(texture):
+    """(width, height, depth, values): a buffer is one layer, in reading order."""
     nx, ny, nz = texture["size"]
-    if ny == nz == 1:  # a buffer: its elements in reading order
-        nx, ny, nz = columns, math.ceil(nx / columns), 1
-        values = texture["values"] + [None] * (nx * ny - len(texture["values"]))
-    else:
-        values = texture["values"]
-    across = max(1, columns // (nx + 1))
-    width = min(across, nz) * (nx + 1) - 1
-    height = math.ceil(nz / across) * (ny + 1) - 1
-    sheet = [[None] * width for _ in range(height)]
+    if ny > 1 or nz > 1:
+        return nx, ny, nz, texture["values"]
+    width = SHEET_WIDTH // TEXEL
+    height = math.ceil(nx / width)
+    return width, height, 1, texture["values"] + [None] * (width * height - nx)
+
+
+def frame(sheet, left, top, width, height, colour=(176, 184, 196)):
+    """A line below a layer and one to its right."""
+    for row in sheet[top:top + height]:
+        row[left + width - 1] = colour
+    sheet[top + height - 1][left:left + width] = [colour] * width
+
+
+def texel_sheet(texture, low, high):
+    """Pixels of all layers of a texture, side by side with a line between them: every texel is there once."""
+    nx, ny, nz, values = layers_of(texture)
+    wide, tall = nx * TEXEL + 1, ny * TEXEL + 1
+    across = min(max(1, SHEET_WIDTH // wide), nz)
+    sheet = [[(255, 255, 255)] * (across * wide) for _ in range(math.ceil(nz / across) * tall)]
     for z in range(nz):
-        left, top = (z % across) * (nx + 1), (z // across) * (ny + 1)
-        for y in range(ny):
-            for x in range(nx):
-                sheet[top + y][left + x] = values[(z * ny + y) * nx + x]
+        frame(sheet, z % across * wide, z // across * tall, wide, tall)
+    for i, value in enumerate(values):
+        x, y, z = i % nx, i // nx % ny, i // (nx * ny)
+        if value is None or value != value:
+            continue
+        left, top = z % across * wide + x * TEXEL, z // across * tall + y * TEXEL
+        for row in sheet[top:top + TEXEL]:
+            row[left:left + TEXEL] = [colour_of(value, low, high)] * TEXEL
     return sheet
-
-
-def sheet_pixels(sheet, low, high):
-    """White between layers; texels in the colours of values."""
-    return [[(255, 255, 255) if v is None or v != v else colour_of(v, low, high) for v in row] for row in sheet]
 
 
 def kibibytes(count):
     return f"{count / 1024:.1f} KiB" if count < 99.5 * 1024 else f"{count / 1024:.0f} KiB"
 
 
-def draw_structure(svg, left, top, structure, low, high, texel_size):
-    name = structure["encoding"]
+def draw_structure(svg, left, top, structure, low, high):
+    name, right = structure["encoding"], left + MAP_EDGE + 16
     svg.text(left, top + 14, name, 15, COLOUR[name], weight="bold")
-    parameters = {"page_table": "pages of 4³ cells"}.get(name, "")
-    svg.text(left + 8.5 * len(name) + 12, top + 14, f"filter {structure['filter']}" + (f", {parameters}" if parameters else ""), 11, FAINT)
+    pages = ", pages of 4³ cells" if name == "page_table" else ""
+    svg.text(right, top + 14, f"filter {structure['filter']}{pages}", 11, FAINT)
     draw_boxes(svg, left, top + 24, structure["finest_cells"], [r for r in structure["regions"] if r["holds_mesh"]], MAP_EDGE)
-    x = left + MAP_EDGE + 16
+    y = top + 24
     for texture in structure["textures"]:
         if "values" not in texture:
             continue
-        sheet = texel_sheet(texture, 136)
-        w, h = len(sheet[0]) * texel_size, len(sheet) * texel_size
-        svg.image(x, top + 24, w, h, sheet_pixels(sheet, low, high))
+        sheet = texel_sheet(texture, low, high)
+        svg.image(right, y, len(sheet[0]), len(sheet), sheet)
+        y += len(sheet) + 4
+    below = top + MAP_EDGE + 41
+    svg.text(left, below, "1 region" if len(structure["regions"]) == 1 else f"{len(structure['regions'])} regions", 11)
     roles = structure["memory"]
-    total = sum(roles.values())
-    svg.text(left, top + 24 + MAP_EDGE + 17, f"{len(structure['regions'])} region" + ("s" if len(structure["regions"]) > 1 else ""), 11, INK)
-    told = ", ".join(f"{role} {kibibytes(count)}" for role, count in roles.items() if count > 0)
-    svg.text(left + MAP_EDGE + 16, top + 24 + MAP_EDGE + 17, f"{kibibytes(total)}: {told}", 11, INK)
+    svg.text(right, below, kibibytes(sum(roles.values())), 11, INK, weight="bold")
+    svg.text(left, below + 14, ", ".join(f"{role} {count / 1024:.1f}" for role, count in roles.items() if count >= 52) + " KiB", 11, FAINT)
+
+
+def draw_mesh(svg, left, top, mesh, low, high):
+    right = left + MAP_EDGE + 16
+    svg.text(left, top + 14, "the mesh", 15, weight="bold")
+    svg.text(right, top + 14, f"{mesh['leaf_cells']} leaf cells on {SMALL_MESH['levels']} levels; one slice", 11, FAINT)
+    svg.image(left, top + 24, MAP_EDGE, MAP_EDGE, [[colour_of(v, low, high) for v in line] for line in leaf_rows(mesh)])
+    svg.rect(right, top + 24, MAP_EDGE, MAP_EDGE, "#fafbfc", "none")
+    draw_boxes(svg, right, top + 24, mesh["finest_cells"], mesh["patches"], MAP_EDGE)
+    svg.text(left, top + MAP_EDGE + 41, "values", 11)
+    svg.text(right, top + MAP_EDGE + 41, "patches of level", 11)
+    for level, colour in enumerate(LEVEL):
+        svg.text(right + 100 + 18 * level, top + MAP_EDGE + 41, str(level), 11, colour, weight="bold")
 
 
 def structures(program):
     mesh = program.mesh("small", SMALL_MESH)
-    shown = [program.structure(mesh, *stored, "--texels") for stored in STORED]
-    values = next(t["values"] for t in shown[0]["textures"] if t["holds_values"])
+    cells = program.structure(mesh, "uniform", "nearest", [], "--texels")
+    values = [v for line in leaf_rows(cells) for v in line]
     low, high = min(values), max(values)
-    column, row = 470, 222
-    svg = Svg(2 * column + 10, 3 * row + 22, "One small mesh, and what each encoding stores of it")
-    leaf_colours = [[colour_of(v, low, high) for v in line] for line in leaf_rows(shown[0], values)]
-    svg.text(14, 24, "the mesh", 15, weight="bold")
-    svg.text(94, 24, f"{shown[0]['leaf_cells']} leaf cells on {len(SMALL_MESH['root'])} levels; one slice", 11, FAINT)
-    svg.image(14, 34, MAP_EDGE, MAP_EDGE, leaf_colours)
-    svg.rect(14, 34, MAP_EDGE, MAP_EDGE, "none", "#b8bec8")
-    x = 14 + MAP_EDGE + 16
-    svg.rect(x, 34, MAP_EDGE, MAP_EDGE, "#fafbfc", "none")
-    draw_boxes(svg, x, 34, shown[0]["finest_cells"], shown[0]["patches"], MAP_EDGE)
-    svg.text(14, 34 + MAP_EDGE + 17, "values", 11)
-    svg.text(x, 34 + MAP_EDGE + 17, "patches of", 11)
-    for level, colour in enumerate(LEVEL):
-        svg.text(x + 62 + 50 * level, 34 + MAP_EDGE + 17, f"level {level}", 11, colour)
-    for i, structure in enumerate(shown, start=1):
-        draw_structure(svg, 14 + (i % 2) * column, 10 + (i // 2) * row, structure, low, high, 2)
+    column, row = 484, 248
+    svg = Svg(2 * column, 3 * row + 26, "One small mesh, and what each encoding stores of it")
+    draw_mesh(svg, 14, 10, cells, low, high)
+    for i, stored in enumerate(STORED, start=1):
+        draw_structure(svg, 14 + (i % 2) * column, 10 + (i // 2) * row, program.structure(mesh, *stored, "--texels"), low, high)
     svg.text(14, 3 * row + 12, "Left: regions in the slice, in the colour of their level. Right: every texel of the value texture, layer by layer, "
-             "at one scale, so that area is memory.", 11, FAINT)
+             "at one scale: area is memory.", 12, INK)
     return svg
 
 
@@ -184,24 +209,26 @@ def filters(program):
     leaves = jump_leaves(program.structure(mesh, "uniform", "nearest", []))
     pages = program.structure(mesh, "page_table", "linear_page", ["page_size=4"])["regions"]
     y = z = 2.3  # beside the cells' centres, as most of a picture is
-    count = 1600
-    points = [((i + 0.5) * 8 / count, y, z) for i in range(count)]
-    svg = Svg(960, 5 * 128 + 66, "What each filter makes of one level jump")
-    for i, (name, encoding, parameters) in enumerate(FILTERS):
+    length, count = JUMP_MESH["root"][0], 1200
+    points = [((i + 0.5) * length / count, y, z) for i in range(count)]
+    svg = Svg(960, 5 * 128 + 82, "What each filter makes of one level jump")
+    for i, (name, encoding, parameters, told) in enumerate(FILTERS):
         values = program.sample(mesh, encoding, name, parameters, points)
-        axes = Axes(svg, (150, 14 + 128 * i, 790, 112), (0, 8), (-0.08, 1.12))
+        axes = Axes(svg, (200, 14 + 128 * i, 740, 112), (0, length), (-0.08, 1.12))
         draw_leaves(axes, leaves, program, mesh, y, z)
         if name == "linear_page":
             draw_page_ends(axes, pages)
         draw_curve(axes, points, values)
         svg.rect(*axes.box, "none", "#b8bec8")
         svg.text(14, axes.box[1] + 50, name, 14, weight="bold")
+        svg.text(14, axes.box[1] + 68, told, 11, FAINT)
     bottom = 14 + 128 * 5
-    for x in range(9):
+    for x in range(length + 1):
         svg.text(axes.x(x), bottom, str(x), 11, FAINT, "middle")
-    svg.text(545, bottom + 18, "x, in cells of level 0", 12, INK, "middle")
-    svg.text(150, bottom + 38, "Bars: leaf cells and their values along the line (level 0 grey, level 1, four times as fine, orange). "
-             "Line: f(x) of the double reference. Dashes: ends of pages of 4³ cells.", 11, FAINT)
+    svg.text(570, bottom + 18, "x, in cells of level 0", 12, INK, "middle")
+    svg.text(14, bottom + 40, "Bars: leaf cells along the line and their values; level 0 grey, level 1 (four times as fine) orange. Line: f(x) of the double "
+             "reference.", 12, FAINT)
+    svg.text(14, bottom + 57, "Dashes: ends of pages of 4³ cells. A page with an orange cell in it has level 1; there a grey cell's value stands still.", 12, FAINT)
     return svg
 
 
@@ -218,7 +245,7 @@ def draw_page_ends(axes, pages):
         axes.svg.line(axes.x(x / 4), axes.box[1], axes.x(x / 4), axes.box[1] + axes.box[3], FAINT, 1, "3 3")
 
 
-def draw_curve(axes, points, values, jump=0.02):
+def draw_curve(axes, points, values, jump=0.03):
     """The line is broken where f jumps."""
     piece = []
     for (x, _, _), value in zip(points, values):
@@ -236,7 +263,7 @@ SHOWN_STEP = 2  # cell widths, of both modes
 
 
 def sampling(program):
-    mesh = program.mesh("small", SMALL_MESH)
+    mesh = program.mesh("ray", RAY_MESH)
     direction = [b - a for a, b in zip(RAY_FROM, RAY_TO)]
     ray = ["--ray", *(repr(v) for v in (*RAY_FROM, *direction))]
     edge, gap = 440, 30
@@ -245,7 +272,7 @@ def sampling(program):
         shown = program.structure(mesh, "kd_tree", "linear_lod", [], *ray, f"--sampling={mode}", f"--step={SHOWN_STEP}")
         left, top = 14 + i * (edge + gap), 34
         svg.text(left, 22, mode, 15, weight="bold")
-        svg.text(left + 76, 22, f"{len(shown['samples'])} samples", 12, FAINT)
+        svg.text(left + 100, 22, f"{len(shown['samples'])} samples", 12, FAINT)
         svg.rect(left, top, edge, edge, "#fafbfc", "none")
         draw_boxes(svg, left, top, shown["finest_cells"], shown["regions"], edge)
         at = lambda p: (left + p[0] * edge, top + edge - p[1] * edge)

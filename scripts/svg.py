@@ -67,8 +67,8 @@ def _points(points):
     return " ".join(f"{x:.2f},{y:.2f}" for x, y in points)
 
 
-def _png(rows, enlarge=4):
-    """Texels enlarged, because not every viewer obeys image-rendering."""
+def _png(rows, enlarge=3):
+    """Pixels enlarged, because not every viewer obeys image-rendering."""
     height, width = len(rows), len(rows[0])
     raw = b"".join((b"\0" + b"".join(bytes(p) * enlarge for p in row)) * enlarge for row in rows)
 
@@ -79,7 +79,7 @@ def _png(rows, enlarge=4):
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(raw, 9)) + chunk(b"IEND", b"")
 
 
-_SCALE = [(68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37)]  # dark to light, even in lightness
+_SCALE = [(240, 244, 250), (178, 212, 226), (84, 160, 190), (30, 92, 148), (10, 32, 84)]  # light to dark
 
 
 def colour_of(value, low, high):

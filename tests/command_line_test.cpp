@@ -148,7 +148,7 @@ Json one_point() { return with(small_experiment(), "encodings", {{{"name", "page
 
 TEST_F(CommandLine, EveryCommandHasHelpWithAnExample) {
   for (const std::string command :
-       {"encodings", "doctor", "info", "generate", "convert", "sample", "render", "run", "report", "verify", "advise"}) {
+       {"encodings", "doctor", "info", "generate", "convert", "sample", "structure", "render", "run", "report", "verify", "advise"}) {
     const Result r = amrtex({command, "--help"});
     EXPECT_EQ(r.exit_code, 0) << command;
     EXPECT_THAT(r.out, HasSubstr("Example: amrtex " + command));
