@@ -1,7 +1,8 @@
 #include <fmt/format.h>
 
-#include <array>
+#include <cmath>
 #include <map>
+#include <optional>
 
 #include "bench/cli/commands.hpp"
 #include "renderers/cpu/structure_view.hpp"

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "renderers/consumers/raycaster.hpp"
 #include "renderers/cpu/sampled_reference.hpp"
 #include "renderers/scene/scene_bindings.hpp"
 #include "structures/mesh/error.hpp"
