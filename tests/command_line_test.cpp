@@ -147,8 +147,8 @@ Json one_point() { return with(small_experiment(), "encodings", {{{"name", "page
 // --- usage ---
 
 TEST_F(CommandLine, EveryCommandHasHelpWithAnExample) {
-  for (const std::string command :
-       {"encodings", "doctor", "info", "generate", "convert", "sample", "render", "run", "report", "verify", "advise"}) {
+  for (const std::string command : {"encodings", "doctor", "info", "generate", "convert", "sample", "structure", "render", "run",
+                                    "report", "verify", "advise"}) {
     const Result r = amrtex({command, "--help"});
     EXPECT_EQ(r.exit_code, 0) << command;
     EXPECT_THAT(r.out, HasSubstr("Example: amrtex " + command));
@@ -392,6 +392,46 @@ TEST_F(CommandLine, SampleWithAFilterThatTheEncodingLacks) {
   write_text(at("p"), "0.5 0.5 0.5\n");
   expect_complaint(amrtex({"sample", kData, "--encoding", "uniform", "--filter", "basis", "--points", at("p")}), 1,
                    HasSubstr("it has nearest, linear_page"));
+}
+
+// --- structure ---
+
+std::vector<std::string> structure(const std::vector<std::string>& more) {
+  std::vector<std::string> arguments = {"structure", kData, "--encoding", "page_table", "--filter", "nearest"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+TEST_F(CommandLine, StructureTellsRegionsTexelsAndTheSamplesOfARay) {
+  const Json shown = json_of(structure(
+      {"--parameter", "page_size=8", "--ray", "-1", "0.5", "0.5", "1", "0", "0", "--sampling=lattice", "--texels", "--json"}));
+  EXPECT_EQ(shown.at("build_parameters").at("page_size"), 8);
+  std::int64_t bytes = 0, roles = 0;
+  for (const Json& texture : shown.at("textures")) {
+    bytes += texture.at("bytes").get<std::int64_t>();
+    const std::vector<std::int64_t> size = texture.at("size");
+    if (texture.at("holds_values"))
+      EXPECT_EQ(static_cast<std::int64_t>(texture.at("values").size()), size[0] * size[1] * size[2]);
+  }
+  for (const Json& role : shown.at("memory")) roles += role.get<std::int64_t>();
+  EXPECT_EQ(bytes, roles);
+  EXPECT_THAT(shown.at("patches"), SizeIs(56));  // 8 + 24 + 24, data/README.md
+  EXPECT_THAT(shown.at("samples"), SizeIs(64));  // finest cells along x
+  EXPECT_GT(shown.at("samples")[1].at("p")[0], shown.at("samples")[0].at("p")[0]);
+}
+
+TEST_F(CommandLine, StructureToRead) {
+  const Result r = amrtex(structure({}));
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  for (const char* word : {"page_table", "regions", "payload", "tex_"}) EXPECT_THAT(r.out, HasSubstr(word));
+}
+
+TEST_F(CommandLine, StructureRefusesRaysAndStepsThatAreNone) {
+  expect_complaint(amrtex(structure({"--ray", "0", "0", "0", "0", "0", "0"})), 2, HasSubstr("not all 0"));
+  expect_complaint(amrtex(structure({"--ray", "0", "0"})), 2, HasSubstr("--ray"));
+  expect_complaint(amrtex(structure({"--step", "0"})), 2, AllOf(HasSubstr("--step 0"), HasSubstr("above 0")));
+  expect_complaint(amrtex(structure({"--sampling", "random"})), 2, HasSubstr("lattice, adaptive"));
+  expect_complaint(amrtex(structure({"--parameter", "page_size=5"})), 2, HasSubstr("4, 8, 16, 32, 64 or 128"));
 }
 
 // --- pictures ---

@@ -17,6 +17,7 @@ using Command = std::function<int()>;
 void add_mesh_commands(CLI::App& app, Command& chosen);     // info, generate, convert
 void add_context_commands(CLI::App& app, Command& chosen);  // encodings, doctor
 void add_sample_command(CLI::App& app, Command& chosen);
+void add_structure_command(CLI::App& app, Command& chosen);
 void add_render_command(CLI::App& app, Command& chosen);
 void add_run_commands(CLI::App& app, Command& chosen);  // run, report
 void add_verify_command(CLI::App& app, Command& chosen);
@@ -26,6 +27,8 @@ void add_advise_command(CLI::App& app, Command& chosen);
 std::int64_t parse_bytes(const std::string& text);
 /// A JSON file, or the JSON itself. Throws UsageError naming the file, or `what` for JSON without one, and the line.
 Json read_json_argument(const std::string& text, const char* what);
+/// Build parameters from texts NAME=VALUE. Throws UsageError.
+Json parse_parameters(const std::vector<std::string>& given);
 /// Throws UnsupportedError with the encoding's reason where this context cannot hold it.
 void require_support(const Encoding& encoding, const ContextInfo& context);
 

@@ -52,6 +52,7 @@ int main(int argc, char** argv) {
   amrtex::add_context_commands(app, chosen);
   amrtex::add_mesh_commands(app, chosen);
   amrtex::add_sample_command(app, chosen);
+  amrtex::add_structure_command(app, chosen);
   amrtex::add_render_command(app, chosen);
   amrtex::add_run_commands(app, chosen);
   amrtex::add_verify_command(app, chosen);

@@ -17,6 +17,13 @@ struct ProbeResult {
   int level = -1;
 };
 
+/// Part of the domain in which one locate() of the encoding stays valid.
+struct FieldRegion {
+  Box cells;  ///< finest cells
+  int level = 0;
+  bool holds_mesh = false;  ///< else the march steps over it
+};
+
 /// The shader text of one encoding in one precision. Thread-safe once set up.
 class CpuField {
  public:
@@ -27,6 +34,8 @@ class CpuField {
                    const std::vector<const HostTexture*>& textures) = 0;
   /// Field number `field`; throws UsageError where there are not so many.
   virtual ProbeResult sample(const Vec3i& finest_cell, const Vec3d& fraction, int field = 0) const = 0;
+  /// What locate() answers at the lower corner of a cell of the finest level.
+  virtual FieldRegion region_at(const Vec3i& finest_cell) const = 0;
   /// Ray of the pixel whose centre is (x, y) from the lower left, in pixels.
   virtual std::array<double, 4> trace(double x, double y) const = 0;
 };

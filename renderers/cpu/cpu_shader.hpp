@@ -35,6 +35,15 @@ class CpuShader final : public CpuField {
     return {found, static_cast<double>(s.value), s.level};
   }
 
+  FieldRegion region_at(const Vec3i& finest_cell) const override {
+    typename Shader::Position p;
+    p.cell = finest_cell;
+    p.fraction = glm::vec<3, real>(0);
+    typename Shader::Region r;
+    const bool found = text().locate(p, r);
+    return {{r.lower, r.upper}, r.level, found};
+  }
+
   std::array<double, 4> trace(double x, double y) const override {
     typename Shader::Ray ray;
     typename Shader::Accumulation a = text().empty_accumulation();
