@@ -7,7 +7,7 @@ set -euo pipefail
 
 packages=(g++ cmake ninja-build pkg-config python3 python3-glad
           libegl-dev libgl-dev libglm-dev libtbb-dev nlohmann-json3-dev libfmt-dev libspdlog-dev
-          libassimp-dev libcli11-dev libpng-dev libxxhash-dev libgtest-dev libgmock-dev libbenchmark-dev librapidcheck-dev)
+          libtinyobjloader-dev libcli11-dev libpng-dev libxxhash-dev libgtest-dev libgmock-dev libbenchmark-dev librapidcheck-dev)
 mesa=(libgl1-mesa-dri libegl-mesa0 libglx-mesa0 mesa-vulkan-drivers libvulkan1 libgbm1)
 # Mesa 25.1 dropped OSMesa; where a distribution has no package, the EGL path alone remains.
 osmesa=libosmesa6-dev

@@ -21,8 +21,8 @@ class JsonFile {
  public:
   /// Throws Error when the file cannot be read, UsageError as the constructor does.
   static JsonFile read(const std::filesystem::path& path);
-  /// Throws UsageError with line and column of a syntax error, or the line of a key
-  /// that is given twice.
+  /// A byte-order mark is skipped. Throws UsageError with line and column of a syntax error or a NUL, or the line of a key
+  /// that is given twice, of values nested too deep and of a number too large.
   JsonFile(std::string text, std::filesystem::path path);
 
   const std::filesystem::path& path() const { return path_; }
