@@ -4,14 +4,13 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
 #include <iterator>
 
 #include "structures/mesh/error.hpp"
 #include "structures/mesh/quoted.hpp"
+#include "structures/readers/reader_tools.hpp"
 
 namespace amrtex {
 namespace {
@@ -20,9 +19,13 @@ constexpr std::size_t kMostBytes = std::size_t{256} << 20;  ///< of a file: a ta
 /// Deeper nesting has no meaning in our files; whoever walks over the values may recurse.
 constexpr std::size_t kMaxDepth = 64;
 /// Objects of ours have tens of keys, and each new one is compared with all before it.
-constexpr std::size_t kMostKeys = 10000;
+constexpr std::size_t kMostKeys = 1000;
+/// Of a message behind its place: names of encodings and fields stand in it as the file has them.
+constexpr std::size_t kLongestProblem = 300;
 /// Longer keys are none of ours, and not worth the time to look for one that is like them.
 constexpr std::size_t kLongestName = 80;
+
+using Lines = std::map<std::string, int, std::less<>>;  ///< of places
 
 /// Where the parser is in its text.
 struct Cursor {
@@ -62,10 +65,11 @@ class CountingIterator {
 /// that they cannot disagree on what the text is.
 class Builder {
  public:
-  Builder(std::string_view text, const std::filesystem::path& path, Cursor& cursor) : text_(text), path_(path), cursor_(cursor) {}
+  /// `lines` may be null.
+  Builder(std::string_view text, const std::filesystem::path& path, Cursor& cursor, Lines* lines)
+      : text_(text), path_(path), cursor_(cursor), lines_(lines) {}
 
   Json& json() { return root_; }
-  std::map<std::string, int, std::less<>>& lines() { return lines_; }
 
   bool null() { return add(nullptr); }
   bool boolean(bool value) { return add(value); }
@@ -84,8 +88,7 @@ class Builder {
     level.key = std::move(name);
     level.place = level.parent + (level.parent.empty() ? "" : ".") + level.key;
     if (level.value->contains(level.key)) refuse(fmt::format("{}: this key is given twice", clipped(level.place)));
-    if (level.value->size() == kMostKeys)
-      refuse(fmt::format("{}: an object of more than {} keys", clipped(level.parent), kMostKeys));
+    if (level.value->size() == kMostKeys) refuse(fmt::format("an object of more than {} keys", kMostKeys));
     note();
     return true;
   }
@@ -120,7 +123,9 @@ class Builder {
     throw UsageError(fmt::format("{}:{}: {}", path_.string(), cursor_.line, what));
   }
 
-  void note(int line_ends_read = 0) { lines_.emplace(levels_.back().place, cursor_.line - line_ends_read); }
+  void note(int line_ends_read = 0) {
+    if (lines_ != nullptr) lines_->emplace(levels_.back().place, cursor_.line - line_ends_read);
+  }
 
   /// A number ends with the first character behind it, which may be that of the line's end.
   template <class T>
@@ -157,7 +162,7 @@ class Builder {
   Cursor& cursor_;
   Json root_;
   std::vector<Level> levels_;
-  std::map<std::string, int, std::less<>> lines_{{"", 1}};
+  Lines* lines_;
 };
 
 /// Letters to insert, remove, replace or swap with their neighbour (optimal string alignment).
@@ -175,23 +180,14 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return d[a.size()][b.size()];
 }
 
-/// The whole of a file, or of a pipe.
-std::string read_all(const std::filesystem::path& path) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored))
-    throw Error(fmt::format("{}: this is a folder, not a JSON file", path.string()));
-  errno = 0;
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw Error(fmt::format("{}: {}", path.string(), reason_of({errno, std::generic_category()})));
-  std::string text;
-  std::vector<char> block(std::size_t{1} << 16);
-  while (in.read(block.data(), std::ssize(block)) || in.gcount() > 0) {
-    text.append(block.data(), static_cast<std::size_t>(in.gcount()));
-    if (text.size() > kMostBytes)
-      throw Error(fmt::format("{}: more than {} bytes; no JSON file of ours is that long", path.string(), kMostBytes));
-  }
-  if (in.bad()) throw Error(fmt::format("{}: {}", path.string(), reason_of({errno, std::generic_category()})));
-  return text;
+Json parse(std::string_view text, const std::filesystem::path& path, Lines* lines) {
+  // the parser takes a NUL for the end and never sees what follows
+  if (const std::size_t nul = text.find('\0'); nul != std::string_view::npos)
+    throw UsageError(fmt::format("{}:{}: not valid JSON: a NUL character", path.string(), Builder::line_and_column(text, nul)));
+  Cursor cursor{text.data()};
+  Builder builder(text, path, cursor, lines);
+  Json::sax_parse(CountingIterator(text.data(), &cursor), CountingIterator(text.data() + text.size(), &cursor), &builder);
+  return std::move(builder.json());
 }
 
 }  // namespace
@@ -210,17 +206,12 @@ std::string suggestion(std::string_view name, std::span<const std::string_view> 
   return best.empty() ? "" : fmt::format("; did you mean '{}'?", best);
 }
 
-JsonFile JsonFile::read(const std::filesystem::path& path) { return JsonFile(read_all(path), path); }
+Json read_json(const std::filesystem::path& path) { return parse(load_stream(path, kMostBytes), path, nullptr); }
 
-JsonFile::JsonFile(std::string text, std::filesystem::path path) : path_(std::move(path)) {
-  // the parser takes a NUL for the end and never sees what follows
-  if (const std::size_t nul = text.find('\0'); nul != std::string::npos)
-    throw UsageError(fmt::format("{}:{}: not valid JSON: a NUL character", path_.string(), Builder::line_and_column(text, nul)));
-  Cursor cursor{text.data()};
-  Builder builder(text, path_, cursor);
-  Json::sax_parse(CountingIterator(text.data(), &cursor), CountingIterator(text.data() + text.size(), &cursor), &builder);
-  json_ = std::move(builder.json());
-  lines_ = std::move(builder.lines());
+JsonFile JsonFile::read(const std::filesystem::path& path) { return JsonFile(load_stream(path, kMostBytes), path); }
+
+JsonFile::JsonFile(const std::string& text, std::filesystem::path path) : path_(std::move(path)), lines_{{"", 1}} {
+  json_ = parse(text, path_, &lines_);
 }
 
 JsonNode JsonFile::root() const { return JsonNode(*this, json_, ""); }
@@ -235,7 +226,7 @@ int JsonFile::line(std::string_view place) const {
 
 void JsonNode::fail(std::string_view problem) const {
   throw UsageError(fmt::format("{}:{}: {}{}{}", file_->path().string(), file_->line(place_), clipped(place_),
-                               place_.empty() ? "" : ": ", problem));
+                               place_.empty() ? "" : ": ", one_line(problem, kLongestProblem)));
 }
 
 std::optional<JsonNode> JsonNode::find(std::string_view key) const {

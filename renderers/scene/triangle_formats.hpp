@@ -56,7 +56,8 @@ std::optional<std::int64_t> integer_of(std::string_view token);
 /// Lines of a text that must all end, without their ends.
 class TextLines {
  public:
-  explicit TextLines(std::string_view text) : text_(text) {}
+  /// `before`: lines of the file in front of the text.
+  explicit TextLines(std::string_view text, int before = 0) : text_(text), number_(before) {}
 
   /// The next line; nullopt behind the last. Throws where it does not end.
   std::optional<std::string_view> next();
@@ -66,7 +67,7 @@ class TextLines {
  private:
   std::string_view text_;
   std::size_t at_ = 0;
-  int number_ = 0;
+  int number_;
 };
 
 /// The words of a line, between white space.

@@ -117,8 +117,9 @@ class HeaderReader {
   void read_property(const std::vector<std::string_view>& words) {
     if (header_.elements.empty()) refuse("a property before the first element");
     Property property;
-    const bool list = words.size() == 5 && words[1] == "list";
-    if (!list && words.size() != 3) refuse("expected `property`, a type and a name, or `property list`, two types and a name");
+    const bool list = words.size() > 1 && words[1] == "list";
+    if (words.size() != (list ? 5U : 3U))
+      refuse("expected `property`, a type and a name, or `property list`, two types and a name");
     if (list) {
       property.count = type(words[2]);
       if (is_real(*property.count)) refuse("the length of a list is a real number; an integer is expected");
@@ -142,8 +143,8 @@ class Numbers {
   virtual void begin_element(const Element&, std::int64_t) {}
   virtual double next(Type type) = 0;
   virtual void end_element() {}
-  /// Numbers that can follow at most.
-  virtual std::uint64_t remaining(Type type) const = 0;
+  /// Throws where fewer numbers follow than a list is said to have.
+  virtual void require(double length, Type type) const = 0;
   /// Throws where something follows.
   virtual void finish() = 0;
 };
@@ -178,7 +179,9 @@ class BinaryNumbers final : public Numbers {
     }
   }
 
-  std::uint64_t remaining(Type type) const override { return (bytes_.size() - at_) / bytes_of(type); }
+  void require(double length, Type type) const override {
+    if (length < 0 || length * static_cast<double>(bytes_of(type)) > static_cast<double>(bytes_.size() - at_)) refuse_end();
+  }
 
   void finish() override {
     if (at_ < bytes_.size()) throw TriangleFileError(fmt::format("{} bytes stand behind its last element", bytes_.size() - at_));
@@ -187,14 +190,17 @@ class BinaryNumbers final : public Numbers {
  private:
   template <class T>
   T raw() {
-    if (bytes_.size() - at_ < sizeof(T))
-      throw TriangleFileError(
-          fmt::format("it ends inside {} {} of {}", element_->name == "face" ? "face" : "element", number_, element_->count));
+    if (bytes_.size() - at_ < sizeof(T)) refuse_end();
     std::array<char, sizeof(T)> bytes;
     std::memcpy(bytes.data(), bytes_.data() + at_, sizeof(T));
     if (swap_) std::reverse(bytes.begin(), bytes.end());
     at_ += sizeof(T);
     return std::bit_cast<T>(bytes);
+  }
+
+  [[noreturn]] void refuse_end() const {
+    throw TriangleFileError(
+        fmt::format("it ends inside {} {} of {}", element_->name == "face" ? "face" : "element", number_, element_->count));
   }
 
   std::string_view bytes_;
@@ -206,8 +212,7 @@ class BinaryNumbers final : public Numbers {
 
 class TextNumbers final : public Numbers {
  public:
-  TextNumbers(const TriangleText& file, const Header& header)
-      : file_(file), lines_(file.bytes.substr(header.end)), first_line_(header.lines) {
+  TextNumbers(const TriangleText& file, const Header& header) : file_(file), lines_(file.bytes.substr(header.end), header.lines) {
     for (const Element& element : header.elements) told_ += element.count;
   }
 
@@ -234,7 +239,10 @@ class TextNumbers final : public Numbers {
     if (at_ < words_.size()) refuse(fmt::format("{} stands behind the last number", file_.found(words_[at_])));
   }
 
-  std::uint64_t remaining(Type) const override { return words_.size() - at_; }
+  void require(double length, Type) const override {
+    if (length < 0 || length > static_cast<double>(words_.size() - at_))
+      refuse(fmt::format("a list of {} numbers; {} follow", length, words_.size() - at_));
+  }
 
   void finish() override {
     if (next_line()) refuse("text behind the last element");
@@ -250,12 +258,11 @@ class TextNumbers final : public Numbers {
   }
 
   [[noreturn]] void refuse(const std::string& problem) const {
-    throw TriangleFileError(fmt::format("line {}: {}", first_line_ + lines_.number(), problem));
+    throw TriangleFileError(fmt::format("line {}: {}", lines_.number(), problem));
   }
 
   const TriangleText& file_;
   TextLines lines_;
-  int first_line_;
   std::int64_t told_ = 0;  ///< lines, by the header
   std::int64_t read_ = 0;
   std::vector<std::string_view> words_;
@@ -316,8 +323,7 @@ class ElementReader {
   /// Returns whether it holds corners.
   bool read_list(const Property& property, bool corners) {
     const double length = numbers_.next(*property.count);
-    if (length < 0 || length > static_cast<double>(numbers_.remaining(property.type)))
-      throw TriangleFileError(fmt::format("a list of {} numbers; only {} follow", length, numbers_.remaining(property.type)));
+    numbers_.require(length, property.type);
     if (corners && is_real(property.type))
       throw TriangleFileError("its faces name vertices by real numbers; integers are expected");
     for (auto left = static_cast<std::int64_t>(length); left > 0; --left) {

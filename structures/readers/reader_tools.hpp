@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <charconv>
 #include <cstdint>
@@ -62,6 +63,25 @@ inline std::string load_bytes(const std::filesystem::path& path, std::uint64_t m
   in.read(bytes.data(), static_cast<std::streamsize>(size));
   if (static_cast<std::uint64_t>(in.gcount()) != size)
     throw Error(fmt::format("{}: only {} of {} bytes could be read", path.string(), in.gcount(), size));
+  return bytes;
+}
+
+/// All bytes of a file or a pipe, at most `max_bytes`.
+inline std::string load_stream(const std::filesystem::path& path, std::uint64_t max_bytes) {
+  const auto fail = [&](std::string_view what) -> void { throw Error(fmt::format("{}: {}", path.string(), what)); };
+  if (const std::string reason = why_absent(path); !reason.empty()) fail(reason);
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) fail("a folder, not a file");
+  errno = 0;
+  std::ifstream in(path, std::ios::binary);
+  if (!in) fail(reason_of({errno, std::generic_category()}));
+  std::string bytes;
+  std::array<char, std::size_t{1} << 16> block;
+  while (in.read(block.data(), block.size()) || in.gcount() > 0) {
+    bytes.append(block.data(), static_cast<std::size_t>(in.gcount()));
+    if (bytes.size() > max_bytes) fail(fmt::format("more than {} bytes, which is the most that is read", max_bytes));
+  }
+  if (in.bad()) fail(reason_of({errno, std::generic_category()}));
   return bytes;
 }
 
