@@ -178,7 +178,10 @@ fs::path write_plotfile(const fs::path& folder, const Spec& spec) {
   header += "\n";
   for (std::size_t l = 0; l < levels; ++l) header += "7 ";
   header += "\n";
-  for (std::size_t l = 0; l < levels; ++l) header += "0.5 0.5 0.5 \n";
+  for (const LevelSpec& level : spec.levels) {
+    const Vec3d h = Vec3d(2) / Vec3d(level.domain.size());
+    header += fmt::format("{} {} {} \n", h.x, h.y, h.z);
+  }
   header += "0\n0\n";
   for (std::size_t l = 0; l < levels; ++l) {
     header += fmt::format("{} {} 0.25\n7\n", l, spec.levels[l].boxes.size());
@@ -373,6 +376,20 @@ TEST_F(AmrexReader, ReadsOnlyTheFieldAskedFor) {
   expect_spec(read_mesh(folder_ / "plt", {"Y(O2)"}), spec, {2});
 }
 
+TEST_F(AmrexReader, ReadsTheFirstLineOfOlderCodes) {
+  Spec spec = two_levels();
+  const std::string hash = AmrHierarchy(read_mesh(write_plotfile(folder_ / "new", spec))).content_hash(0);
+  spec.version = "NavierStokes-V1.1";
+  EXPECT_EQ(AmrHierarchy(read_mesh(write_plotfile(folder_ / "old", spec))).content_hash(0), hash);
+}
+
+TEST_F(AmrexReader, TakesCellSizesOfFewDigits) {
+  Spec spec = two_levels(3);
+  write_plotfile(folder_ / "plt", spec);
+  edit(folder_ / "plt" / "Header", "0.16666666666666666", "0.16667");
+  EXPECT_NO_THROW(read_mesh(folder_ / "plt"));
+}
+
 TEST_F(AmrexReader, TakesRatiosFromTheDomains) {
   for (const auto& [first, second] : {std::pair{2, 4}, std::pair{4, 2}, std::pair{3, 2}}) {
     Spec spec = two_levels(first);
@@ -456,6 +473,7 @@ TEST_F(AmrexReader, RefusesMoreValuesThanTheMachineHolds) {
   write_plotfile(folder_ / "plt", spec);
   const std::string small = "(0,0,0) (0,0,0)";
   edit(folder_ / "plt" / "Header", small, "(0,0,0) (8191,8191,8191)");
+  edit(folder_ / "plt" / "Header", "\n2 2 2 \n", "\n0.000244140625 0.000244140625 0.000244140625 \n");
   edit(folder_ / "plt" / "Level_0" / "Cell_H", small, "(0,0,0) (8191,8191,8191)");
   std::error_code failure;
   fs::resize_file(folder_ / "plt" / "Level_0" / "Cell_D_00000", std::uintmax_t{8} << 39, failure);
@@ -491,7 +509,7 @@ std::vector<BadCase> bad_cases() {
   return {
       {"no Header", removes(h), {"plt/Header", "no such file"}},
       {"empty Header", truncates(h, 0), {"plt/Header, line 1", "HyperCLaw-V1.1", "CartGrid-V2.0"}},
-      {"half a Header", truncates(h, 120), {"plt/Header, line", "the text ends here"}},
+      {"half a Header", truncates(h, 118), {"plt/Header, line", "the text ends here"}},
       {"no plotfile", edits(h, "HyperCLaw-V1.1", "something"), {"plt/Header, line 1", "not an AMReX plotfile", "'something'"}},
       {"checkpoint", edits(h, "HyperCLaw-V1.1", "CheckPointVersion_1.0"), {"plt/Header", "a checkpoint"}},
       {"a directory for Header",
@@ -522,6 +540,14 @@ std::vector<BadCase> bad_cases() {
        edits(h, fine, "((-2147483648,0,0) (2147483647,7,7) (0,0,0))"),
        {"plt/Header, line 10", "wider than 2147483647"}},
       {"nodal domain", edits(h, fine, "((0,0,0) (7,7,7) (1,1,1))"), {"plt/Header, line 10", "cell-centred"}},
+      {"cell sizes of another domain",
+       edits(h, "0.25 0.25 0.25", "0.25 0.26 0.25"),
+       {"plt/Header, line 13", "cells of level 1 are said to be 0.26 wide along y", "its 8 cells make them 0.25"}},
+      {"cell sizes that are no numbers", edits(h, "0.25 0.25 0.25", "0.25 nan 0.25"), {"plt/Header, line 13", "nan wide"}},
+      {"a name that is not UTF-8",
+       edits(h, "phi", "p\xffi"),
+       {"plt/Header, line 3", "the name of field 1 of 1, 'p\\xffi', is not UTF-8"}},
+      {"a first line of escapes", edits(h, "HyperCLaw-V1.1", "\x1b[31m"), {"plt/Header, line 1", "'\\x1b[31m'"}},
       {"cylindrical", edits(h, "\n0\n0\n0 2", "\n1\n0\n0 2"), {"plt/Header, line 14", "cylindrical", "only 0 (Cartesian)"}},
       {"spherical", edits(h, "\n0\n0\n0 2", "\n2\n0\n0 2"), {"plt/Header, line 14", "spherical"}},
       {"boundary regions", edits(h, "\n0\n0\n0 2", "\n0\n1\n0 2"), {"plt/Header, line 15", "boundary regions"}},
@@ -642,7 +668,7 @@ TEST_F(AmrexReader, NamesPathsOfNoKnownFormat) {
     EXPECT_NE(message.find("AMReX plotfile"), std::string::npos) << message;
   }
   const std::string message = message_of([&] { read_mesh(folder_ / "absent"); });
-  EXPECT_NE(message.find("absent: no such file or folder"), std::string::npos) << message;
+  EXPECT_NE(message.find("absent: no such file or directory"), std::string::npos) << message;
 }
 
 // ---- writing ----

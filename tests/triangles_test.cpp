@@ -200,7 +200,7 @@ TEST_F(TriangleFiles, ThatAreBrokenAreRefusedByName) {
                                                                HasSubstr(file.problem), HasSubstr("accepted: OBJ, PLY or STL")));
   EXPECT_THAT(complaint(folder_ / "absent.obj"), HasSubstr("absent.obj: no such file"));
   fs::create_directories(folder_ / "folder.obj");
-  EXPECT_THAT(complaint(folder_ / "folder.obj"), HasSubstr("folder.obj: no such file"));
+  EXPECT_THAT(complaint(folder_ / "folder.obj"), HasSubstr("folder.obj: a folder, not a regular file"));
 }
 
 // ---- where rays meet them ----

@@ -10,6 +10,7 @@
 #include "bench/cli/commands.hpp"
 #include "bench/measure/advise.hpp"
 #include "bench/records/record.hpp"
+#include "structures/mesh/quoted.hpp"
 #include "structures/readers/mesh_io.hpp"
 
 namespace amrtex {
@@ -216,7 +217,7 @@ int run(const Arguments& a) {
   const Experiment experiment = parse_experiment(scene.dump(1), "advise");
   const bool terminal = isatty(STDERR_FILENO) != 0;
   const auto progress = [terminal](const std::string& text) {
-    if (terminal) fmt::print(stderr, "{}\n", text);
+    if (terminal) fmt::print(stderr, "{}\n", printable(text));
   };
   const Folder folder(a.keep);
   options.folder = folder.path();

@@ -6,6 +6,7 @@
 #include "bench/settings/json_file.hpp"
 #include "structures/common/encoding.hpp"
 #include "structures/generators/synthetic.hpp"
+#include "structures/mesh/quoted.hpp"
 #include "structures/readers/amrex_plotfile/amrex_plotfile.hpp"
 #include "structures/readers/mesh_io.hpp"
 
@@ -48,8 +49,8 @@ void print_info(const AmrHierarchy& mesh) {
   const Json json = info_json(mesh);
   const Vec3d lower = mesh.domain_lower();
   const Vec3d upper = mesh.domain_upper();
-  fmt::print("{}\n  domain      [{:g}, {:g}] x [{:g}, {:g}] x [{:g}, {:g}]\n", mesh.name(), lower.x, upper.x, lower.y, upper.y,
-             lower.z, upper.z);
+  fmt::print("{}\n  domain      [{:g}, {:g}] x [{:g}, {:g}] x [{:g}, {:g}]\n", printable(mesh.name()), lower.x, upper.x, lower.y,
+             upper.y, lower.z, upper.z);
   fmt::print("  leaf cells  {}{}\n", mesh.leaf_cells(), mesh.has_holes() ? " (the mesh has holes)" : "");
   fmt::print("  hash        {}\n\n  level  patches       cells  leaf cells  ratio to finer\n", json["hash"].get<std::string>());
   for (int l = 0; l < mesh.level_count(); ++l)
@@ -58,7 +59,7 @@ void print_info(const AmrHierarchy& mesh) {
   fmt::print("\n  field                min            max  volume integral\n");
   for (std::size_t f = 0; f < mesh.fields().size(); ++f) {
     const FieldStatistics& s = mesh.statistics(static_cast<int>(f));
-    fmt::print("  {:12} {:12.6g} {:14.6g} {:16.9g}\n", mesh.fields()[f], s.min, s.max, s.volume_integral);
+    fmt::print("  {:12} {:12.6g} {:14.6g} {:16.9g}\n", printable(mesh.fields()[f]), s.min, s.max, s.volume_integral);
     if (s.cells_without_value > 0)
       fmt::print("    {} leaf cells have no value (NaN or infinite); they are not drawn\n", s.cells_without_value);
   }
@@ -73,8 +74,8 @@ void print_info(const AmrHierarchy& mesh) {
 
 Json read_json_argument(const std::string& text, const char* what) {
   if (!text.empty() && text.front() == '{') return JsonFile(text, what).root().json();
-  if (!fs::is_regular_file(text))
-    throw UsageError(fmt::format("{}: no such file; accepted: a JSON file, or the JSON itself in quotes", text));
+  if (const std::string reason = why_absent(text); !reason.empty())
+    throw UsageError(fmt::format("{}: {}; accepted: a JSON file, or the JSON itself in quotes", clipped(text, 200), reason));
   return JsonFile::read(text).root().json();
 }
 
@@ -94,7 +95,7 @@ void add_mesh_commands(CLI::App& app, Command& chosen) {
     chosen = [a] {
       const AmrHierarchy mesh(read_mesh(a->input, a->field.empty() ? std::vector<std::string>() : std::vector{a->field}));
       if (a->json)
-        fmt::print("{}\n", info_json(mesh).dump(2));
+        fmt::print("{}\n", info_json(mesh).dump(2, ' ', true, Json::error_handler_t::replace));
       else
         print_info(mesh);
       return 0;

@@ -5,6 +5,7 @@
 #include "bench/measure/runner.hpp"
 #include "bench/settings/experiment.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 namespace {
@@ -113,7 +114,7 @@ int run(const Arguments& a) {
   request.context = context->info();
   request.needs = scene_needs(drawn, build.filter, build.filtering);
   request.more_fields = more_fields(mesh, drawn);
-  for (const std::string& warning : scene_warnings(mesh, drawn)) fmt::print(stderr, "warning: {}\n", warning);
+  for (const std::string& warning : scene_warnings(mesh, drawn)) fmt::print(stderr, "warning: {}\n", printable(warning));
   if (!a.memory_limit.empty())
     request.memory_limit = parse_bytes(a.memory_limit);
   else if (scene.memory_limit)

@@ -10,6 +10,7 @@
 #include "bench/report/report.hpp"
 #include "bench/report/scatter.hpp"
 #include "bench/report/work_precision.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 namespace {
@@ -92,7 +93,7 @@ int run(const Arguments& a) {
   options.force = a.force;
   if (!a.context.empty()) options.context = parse_context_kind(a.context);
   if (!a.memory_limit.empty()) options.memory_limit = parse_bytes(a.memory_limit);
-  if (isatty(STDERR_FILENO) != 0) options.progress = [](const std::string& text) { fmt::print(stderr, "{}\n", text); };
+  if (isatty(STDERR_FILENO) != 0) options.progress = [](const std::string& text) { fmt::print(stderr, "{}\n", printable(text)); };
   const RunSummary s = run_experiment(experiment, options);
   for (const char* name : {"columns.json", "tables.json"}) copy_beside(experiment, a.output, name);
   const std::vector<Table> tables = write_report(a.output, "");

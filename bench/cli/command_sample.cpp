@@ -1,12 +1,13 @@
 #include <fmt/format.h>
 
-#include <fstream>
 #include <sstream>
 
 #include "bench/cli/commands.hpp"
 #include "bench/measure/error_split.hpp"
 #include "renderers/consumers/probe.hpp"
+#include "structures/mesh/quoted.hpp"
 #include "structures/readers/mesh_io.hpp"
+#include "structures/readers/reader_tools.hpp"
 
 namespace amrtex {
 namespace {
@@ -19,8 +20,9 @@ struct Arguments {
 };
 
 std::vector<Vec3d> read_points(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) throw Error(fmt::format("points file {}: cannot be read", path));
+  const std::string text = load_stream(path, kMaxTextBytes);
+  check_lines(path, text);
+  std::istringstream file(text);
   std::vector<Vec3d> points;
   std::string line;
   for (int n = 1; std::getline(file, line); ++n) {
@@ -29,9 +31,10 @@ std::vector<Vec3d> read_points(const std::string& path) {
     Vec3d p;
     std::string rest;
     if (!(numbers >> p.x >> p.y >> p.z) || (numbers >> rest))
-      throw Error(fmt::format("points file {}, line {}: '{}' is not three numbers x y z (world units)", path, n, line));
+      throw Error(fmt::format("points file {}, line {}: {} is not three numbers x y z (world units)", path, n, quote(line)));
     points.push_back(p);
   }
+  if (points.empty()) throw Error(fmt::format("points file {}: no point; a line x y z for each is expected", path));
   return points;
 }
 
@@ -114,7 +117,9 @@ Json parse_parameters(const std::vector<std::string>& given) {
   Json parameters = Json::object();
   for (const std::string& p : given) {
     const auto equals = p.find('=');
-    if (equals == std::string::npos) throw UsageError(fmt::format("--parameter {}: accepted: NAME=VALUE, as in page_size=8", p));
+    if (equals == std::string::npos)
+      throw UsageError(fmt::format("--parameter {}: accepted: NAME=VALUE, as in page_size=8", clipped(p)));
+    if (!is_utf8(p)) throw UsageError(fmt::format("--parameter {}: not UTF-8; accepted: NAME=VALUE", clipped(p)));
     const std::string value = p.substr(equals + 1);
     const Json json = Json::parse(value, nullptr, false);
     parameters[p.substr(0, equals)] = json.is_discarded() ? Json(value) : json;

@@ -2,12 +2,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
 #include <cstdio>
 #include <new>
 
 #include "bench/cli/commands.hpp"
 #include "structures/mesh/error.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace {
 
@@ -30,15 +30,20 @@ std::string complaint(const CLI::App& app, const CLI::ParseError& error) {
   const Names rest = app.remaining(true);
   const auto given = app.get_subcommands();
   if (given.empty())
-    return fmt::format("{}; accepted: {}", rest.empty() ? "no command given" : fmt::format("no command '{}'", rest.front()),
+    return fmt::format("{}; accepted: {}",
+                       rest.empty() ? "no command given" : fmt::format("no command {}", amrtex::quote(rest.front())),
                        fmt::join(commands_of(app), ", "));
   const CLI::App& command = *given.front();
   if (!rest.empty())
-    return fmt::format("{}: '{}' was not expected; accepted: {}", command.get_name(), rest.front(),
+    return fmt::format("{}: {} was not expected; accepted: {}", command.get_name(), amrtex::quote(rest.front()),
                        fmt::join(options_of(command), ", "));
-  std::string text = error.what();
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return fmt::format("{0}: {1}; see `amrtex {0} --help`", command.get_name(), text);
+  return fmt::format("{0}: {1}; see `amrtex {0} --help`", command.get_name(), amrtex::one_line(error.what(), 200));
+}
+
+/// One line on stderr, of at most 400 characters, whatever a file or a command line put into the message.
+void print_error(std::string_view what) {
+  constexpr std::string_view kFront = "amrtex: ";
+  fmt::print(stderr, "{}{}\n", kFront, amrtex::one_line(what, 400 - kFront.size()));
 }
 
 }  // namespace
@@ -61,19 +66,19 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
-    fmt::print(stderr, "amrtex: {}\n", complaint(app, error));
+    print_error(complaint(app, error));
     return 2;
   }
   try {
     return chosen();
   } catch (const amrtex::UsageError& error) {
-    fmt::print(stderr, "amrtex: {}\n", error.what());
+    print_error(error.what());
     return 2;
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "amrtex: this machine has not enough memory for it\n");
+    print_error("this machine has not enough memory for it");
     return 1;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "amrtex: {}\n", error.what());
+    print_error(error.what());
     return 1;
   }
 }

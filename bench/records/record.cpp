@@ -14,6 +14,7 @@
 #include <system_error>
 
 #include "bench/measure/statistics.hpp"
+#include "bench/settings/json_file.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {
@@ -409,10 +410,13 @@ void write_atomically(const std::filesystem::path& target, std::string_view text
 }
 
 Json read_record(const std::filesystem::path& path) {
+  Json record;
   try {
-    std::ifstream in(path, std::ios::binary);
-    if (!in) throw Error("cannot be read");
-    Json record = Json::parse(in);
+    record = read_json(path);
+  } catch (const UsageError& e) {  // of a file that no user writes
+    throw Error(e.what());
+  }
+  try {
     validate_record(record);
     return record;
   } catch (const std::exception& e) {

@@ -7,6 +7,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "structures/mesh/quoted.hpp"
+
 namespace amrtex {
 namespace {
 
@@ -40,6 +42,14 @@ std::string latex_cell(const Cell& cell) {
                  [](std::int64_t n) { return fmt::format("{}", n); }, [](double x) { return latex_number(x); },
                  [](const Spread& s) { return fmt::format("{} $\\pm$ {}", latex_number(s.median), latex_number(s.deviation)); }},
       cell);
+}
+
+/// Cells and notes of a table that a terminal shows, too.
+std::string on_one_line(std::string_view text) {
+  std::string line(text);
+  std::replace_if(
+      line.begin(), line.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+  return line;
 }
 
 std::string escape_csv(std::string_view text) {
@@ -103,7 +113,7 @@ std::string exact_cell(const Cell& cell) {
 
 std::string escape_latex(std::string_view text) {
   std::string escaped;
-  for (const char c : text) switch (c) {
+  for (const char c : printable(on_one_line(text))) switch (c) {
       case '&':
       case '%':
       case '$':
@@ -129,10 +139,6 @@ std::string escape_latex(std::string_view text) {
       case '>':
         escaped += "\\textgreater{}";
         break;
-      case '\n':
-      case '\r':
-        escaped += ' ';
-        break;
       default:
         escaped += c;
     }
@@ -141,11 +147,7 @@ std::string escape_latex(std::string_view text) {
 
 std::string escape_markdown(std::string_view text) {
   std::string escaped;
-  for (const char c : text) {
-    if (c == '\n' || c == '\r') {
-      escaped += ' ';
-      continue;
-    }
+  for (const char c : printable(on_one_line(text))) {
     // underscores inside words are literal in Markdown; these are not
     if (c == '|' || c == '\\' || c == '*' || c == '`' || c == '<' || c == '[') escaped += '\\';
     escaped += c;

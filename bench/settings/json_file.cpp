@@ -4,125 +4,166 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
-#include <set>
-#include <sstream>
+#include <iterator>
 
 #include "structures/mesh/error.hpp"
+#include "structures/mesh/quoted.hpp"
+#include "structures/readers/reader_tools.hpp"
 
 namespace amrtex {
 namespace {
 
-/// Deeper nesting has no meaning in our files and would only cost time.
+constexpr std::size_t kMostBytes = std::size_t{256} << 20;  ///< of a file: a table of a million points has some 100 MiB
+/// Deeper nesting has no meaning in our files; whoever walks over the values may recurse.
 constexpr std::size_t kMaxDepth = 64;
+/// Objects of ours have tens of keys, and each new one is compared with all before it.
+constexpr std::size_t kMostKeys = 1000;
+/// Of a message behind its place: names of encodings and fields stand in it as the file has them.
+constexpr std::size_t kLongestProblem = 300;
+/// Longer keys are none of ours, and not worth the time to look for one that is like them.
+constexpr std::size_t kLongestName = 80;
 
-/// Finds the line of every key and list element in a text that is already known to be valid JSON.
-class LineScanner {
+using Lines = std::map<std::string, int, std::less<>>;  ///< of places
+
+/// Where the parser is in its text.
+struct Cursor {
+  const char* at;
+  int line = 1;
+};
+
+/// Hands the parser one character after the other and counts the lines that it has seen.
+class CountingIterator {
  public:
-  LineScanner(const std::string& text, const std::filesystem::path& path) : text_(text), path_(path) {}
+  using iterator_category = std::input_iterator_tag;
+  using value_type = char;
+  using difference_type = std::ptrdiff_t;
+  using pointer = const char*;
+  using reference = const char&;
 
-  std::map<std::string, int, std::less<>> scan() {
-    lines_.emplace("", 1);
-    while (at_ < text_.size()) step();
-    return std::move(lines_);
+  CountingIterator(const char* at, Cursor* cursor) : at_(at), cursor_(cursor) {}
+  reference operator*() const { return *at_; }
+  CountingIterator& operator++() {
+    if (*at_ == '\n') ++cursor_->line;
+    cursor_->at = ++at_;
+    return *this;
+  }
+  CountingIterator operator++(int) {
+    const CountingIterator before = *this;
+    ++*this;
+    return before;
+  }
+  bool operator==(const CountingIterator& other) const { return at_ == other.at_; }
+
+ private:
+  const char* at_;
+  Cursor* cursor_;
+};
+
+/// Puts values together as the parser finds them, and notes the line of every key and list element: one parser for both, so
+/// that they cannot disagree on what the text is.
+class Builder {
+ public:
+  /// `lines` may be null.
+  Builder(std::string_view text, const std::filesystem::path& path, Cursor& cursor, Lines* lines)
+      : text_(text), path_(path), cursor_(cursor), lines_(lines) {}
+
+  Json& json() { return root_; }
+
+  bool null() { return add(nullptr); }
+  bool boolean(bool value) { return add(value); }
+  bool number_integer(std::int64_t value) { return add(value, true); }
+  bool number_unsigned(std::uint64_t value) { return add(value, true); }
+  bool number_float(double value, const std::string&) { return add(value, true); }
+  bool string(std::string& value) { return add(std::move(value)); }
+  bool binary(Json::binary_t&) { return false; }  // not in text
+  bool start_object(std::size_t) { return open(Json::object()); }
+  bool start_array(std::size_t) { return open(Json::array()); }
+  bool end_object() { return close(); }
+  bool end_array() { return close(); }
+
+  bool key(std::string& name) {
+    Level& level = levels_.back();
+    level.key = std::move(name);
+    level.place = level.parent + (level.parent.empty() ? "" : ".") + level.key;
+    if (level.value->contains(level.key)) refuse(fmt::format("{}: this key is given twice", clipped(level.place)));
+    if (level.value->size() == kMostKeys) refuse(fmt::format("an object of more than {} keys", kMostKeys));
+    note();
+    return true;
+  }
+
+  bool parse_error(std::size_t position, const std::string& last_token, const nlohmann::detail::exception& e) {
+    if (e.id == 406) refuse(fmt::format("the number {} is too large", clipped(last_token)));
+    const std::size_t offset = std::min(position > 0 ? position - 1 : 0, text_.size());
+    std::string what = e.what();  // "[json.exception...] parse error at line 1, column 2: what; last read: 'token'; expected ..."
+    if (const std::size_t colon = what.find(": "); colon != std::string::npos) what = what.substr(colon + 2);
+    const std::size_t read = what.find("; last read: '");
+    const std::size_t expected = what.rfind("'; expected ");
+    const std::string accepted = expected != std::string::npos ? what.substr(expected + 1) : "";
+    if (read != std::string::npos) what = fmt::format("{}; last read: {}{}", what.substr(0, read), quote(last_token), accepted);
+    throw UsageError(fmt::format("{}:{}: not valid JSON: {}", path_.string(), line_and_column(text_, offset), what));
+  }
+
+  static std::string line_and_column(std::string_view text, std::size_t offset) {
+    const std::string_view before = text.substr(0, offset);
+    const std::size_t start = before.rfind('\n') == std::string_view::npos ? 0 : before.rfind('\n') + 1;
+    return fmt::format("{}:{}", 1 + std::count(before.begin(), before.end(), '\n'), offset - start + 1);
   }
 
  private:
   struct Level {
-    bool object;
-    std::size_t index;
-    std::string key;
-    bool expects_key;
-    std::set<std::string> keys;
+    Json* value;         ///< an object or a list that is being filled
+    std::string parent;  ///< its own place
+    std::string key;     ///< of an object: what the next value belongs to
+    std::string place;   ///< of the next value
   };
 
-  void step() {
-    const char c = text_[at_];
-    if (std::isspace(static_cast<unsigned char>(c)) || c == ':') {
-      if (c == '\n') ++line_;
-      ++at_;
-    } else if (c == ',') {
-      next_element();
-    } else if (c == '}' || c == ']') {
-      levels_.pop_back();
-      ++at_;
-    } else if (c == '"' && !levels_.empty() && levels_.back().expects_key) {
-      read_key();
-    } else {
-      read_value();
-    }
+  [[noreturn]] void refuse(const std::string& what) const {
+    throw UsageError(fmt::format("{}:{}: {}", path_.string(), cursor_.line, what));
   }
 
-  void next_element() {
+  void note(int line_ends_read = 0) {
+    if (lines_ != nullptr) lines_->emplace(levels_.back().place, cursor_.line - line_ends_read);
+  }
+
+  /// A number ends with the first character behind it, which may be that of the line's end.
+  template <class T>
+  bool add(T value, bool reads_on = false) {
+    put(Json(std::move(value)), reads_on && cursor_.at != text_.data() && cursor_.at[-1] == '\n' ? 1 : 0);
+    return true;
+  }
+
+  Json* put(Json value, int line_ends_read) {
+    if (levels_.empty()) return &(root_ = std::move(value));
     Level& level = levels_.back();
-    ++level.index;
-    level.expects_key = level.object;
-    ++at_;
+    if (level.value->is_object()) return &(level.value->operator[](level.key) = std::move(value));
+    level.place = fmt::format("{}[{}]", level.parent, level.value->size());
+    note(line_ends_read);
+    level.value->push_back(std::move(value));
+    return &level.value->back();
   }
 
-  void read_key() {
-    const std::size_t begin = at_;
-    skip_string();
-    Level& level = levels_.back();
-    level.key = Json::parse(text_.substr(begin, at_ - begin)).get<std::string>();
-    level.expects_key = false;
-    if (!level.keys.insert(level.key).second)
-      throw UsageError(fmt::format("{}:{}: {}: this key is given twice", path_.string(), line_, place()));
-    lines_.emplace(place(), line_);
+  bool open(Json value) {
+    if (levels_.size() == kMaxDepth) refuse(fmt::format("nested more than {} deep", kMaxDepth));
+    Json* const inside = put(std::move(value), 0);
+    const std::string place = levels_.empty() ? "" : levels_.back().place;
+    levels_.push_back({inside, place, "", place});
+    return true;
   }
 
-  void read_value() {
-    if (!levels_.empty() && !levels_.back().object) lines_.emplace(place(), line_);
-    const char c = text_[at_];
-    if (c == '{' || c == '[') {
-      if (levels_.size() == kMaxDepth)
-        throw UsageError(fmt::format("{}:{}: nested more than {} deep", path_.string(), line_, kMaxDepth));
-      levels_.push_back({c == '{', 0, "", c == '{', {}});
-      ++at_;
-    } else if (c == '"') {
-      skip_string();
-    } else {
-      at_ = std::min(text_.find_first_of(",]} \t\r\n", at_ + 1), text_.size());
-    }
+  bool close() {
+    levels_.pop_back();
+    return true;
   }
 
-  void skip_string() {
-    for (++at_; text_[at_] != '"'; ++at_)
-      if (text_[at_] == '\\') ++at_;
-    ++at_;
-  }
-
-  std::string place() const {
-    std::string place;
-    for (const Level& level : levels_) {
-      if (!level.object)
-        place += fmt::format("[{}]", level.index);
-      else
-        place += (place.empty() ? "" : ".") + level.key;
-    }
-    return place;
-  }
-
-  const std::string& text_;
+  std::string_view text_;
   const std::filesystem::path& path_;
-  std::size_t at_ = 0;
-  int line_ = 1;
+  Cursor& cursor_;
+  Json root_;
   std::vector<Level> levels_;
-  std::map<std::string, int, std::less<>> lines_;
+  Lines* lines_;
 };
-
-[[noreturn]] void throw_syntax_error(const std::string& text, const std::filesystem::path& path, const Json::parse_error& e) {
-  const std::size_t offset = e.byte > 0 ? std::min(e.byte - 1, text.size()) : 0;
-  const std::string before = text.substr(0, offset);
-  const auto line = 1 + std::count(before.begin(), before.end(), '\n');
-  const std::size_t line_start = before.rfind('\n') == std::string::npos ? 0 : before.rfind('\n') + 1;
-  std::string what = e.what();  // "[json.exception...] parse error at line 1, column 2: what"
-  if (const std::size_t colon = what.find(": "); colon != std::string::npos) what = what.substr(colon + 2);
-  throw UsageError(fmt::format("{}:{}:{}: not valid JSON: {}", path.string(), line, offset - line_start + 1, what));
-}
 
 /// Letters to insert, remove, replace or swap with their neighbour (optimal string alignment).
 std::size_t edit_distance(std::string_view a, std::string_view b) {
@@ -139,16 +180,20 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return d[a.size()][b.size()];
 }
 
-/// A value as it is quoted in messages, cut where long.
-std::string shown(const Json& json) {
-  std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
-  if (text.size() > 60) text = text.substr(0, 57) + "...";
-  return text;
+Json parse(std::string_view text, const std::filesystem::path& path, Lines* lines) {
+  // the parser takes a NUL for the end and never sees what follows
+  if (const std::size_t nul = text.find('\0'); nul != std::string_view::npos)
+    throw UsageError(fmt::format("{}:{}: not valid JSON: a NUL character", path.string(), Builder::line_and_column(text, nul)));
+  Cursor cursor{text.data()};
+  Builder builder(text, path, cursor, lines);
+  Json::sax_parse(CountingIterator(text.data(), &cursor), CountingIterator(text.data() + text.size(), &cursor), &builder);
+  return std::move(builder.json());
 }
 
 }  // namespace
 
 std::string suggestion(std::string_view name, std::span<const std::string_view> accepted) {
+  if (name.size() > kLongestName) return "";
   std::string_view best;
   std::size_t best_distance = 1 + std::max<std::size_t>(1, name.size() / 3);
   for (const std::string_view candidate : accepted) {
@@ -161,25 +206,12 @@ std::string suggestion(std::string_view name, std::span<const std::string_view> 
   return best.empty() ? "" : fmt::format("; did you mean '{}'?", best);
 }
 
-JsonFile JsonFile::read(const std::filesystem::path& path) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored))
-    throw Error(fmt::format("{}: this is a folder, not a JSON file", path.string()));
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  if (!in || !(text << in.rdbuf())) throw Error(fmt::format("{}: cannot be read, or is empty", path.string()));
-  return JsonFile(text.str(), path);
-}
+Json read_json(const std::filesystem::path& path) { return parse(load_stream(path, kMostBytes), path, nullptr); }
 
-JsonFile::JsonFile(std::string text, std::filesystem::path path) : path_(std::move(path)) {
-  try {
-    json_ = Json::parse(text);
-  } catch (const Json::parse_error& e) {
-    throw_syntax_error(text, path_, e);
-  } catch (const Json::out_of_range& e) {
-    throw UsageError(fmt::format("{}: a number is too large: {}", path_.string(), e.what()));
-  }
-  lines_ = LineScanner(text, path_).scan();
+JsonFile JsonFile::read(const std::filesystem::path& path) { return JsonFile(load_stream(path, kMostBytes), path); }
+
+JsonFile::JsonFile(const std::string& text, std::filesystem::path path) : path_(std::move(path)), lines_{{"", 1}} {
+  json_ = parse(text, path_, &lines_);
 }
 
 JsonNode JsonFile::root() const { return JsonNode(*this, json_, ""); }
@@ -193,8 +225,8 @@ int JsonFile::line(std::string_view place) const {
 }
 
 void JsonNode::fail(std::string_view problem) const {
-  throw UsageError(
-      fmt::format("{}:{}: {}{}{}", file_->path().string(), file_->line(place_), place_, place_.empty() ? "" : ": ", problem));
+  throw UsageError(fmt::format("{}:{}: {}{}{}", file_->path().string(), file_->line(place_), clipped(place_),
+                               place_.empty() ? "" : ": ", one_line(problem, kLongestProblem)));
 }
 
 std::optional<JsonNode> JsonNode::find(std::string_view key) const {
@@ -231,7 +263,11 @@ void JsonNode::accept_keys(std::span<const std::string_view> keys) const {
 
 std::string JsonNode::text() const {
   if (!json_->is_string()) fail(fmt::format("a string is expected, not {}", shown(*json_)));
-  return json_->get<std::string>();
+  const auto& text = json_->get_ref<const std::string&>();
+  // names of files, fields and keys end there for the system
+  if (text.find('\0') != std::string::npos)
+    fail(fmt::format("a string without NUL characters is expected, not {}", shown(*json_)));
+  return text;
 }
 
 bool JsonNode::boolean() const {
@@ -262,7 +298,7 @@ std::int64_t JsonNode::integer(std::int64_t min, std::int64_t max) const {
 std::string JsonNode::one_of(std::span<const std::string_view> accepted) const {
   const std::string value = text();
   if (std::find(accepted.begin(), accepted.end(), value) == accepted.end())
-    fail(fmt::format("unknown value '{}'; accepted: {}{}", value, fmt::join(accepted, ", "), suggestion(value, accepted)));
+    fail(fmt::format("unknown value {}; accepted: {}{}", quote(value), fmt::join(accepted, ", "), suggestion(value, accepted)));
   return value;
 }
 

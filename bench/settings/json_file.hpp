@@ -21,9 +21,9 @@ class JsonFile {
  public:
   /// Throws Error when the file cannot be read, UsageError as the constructor does.
   static JsonFile read(const std::filesystem::path& path);
-  /// Throws UsageError with line and column of a syntax error, or the line of a key
-  /// that is given twice.
-  JsonFile(std::string text, std::filesystem::path path);
+  /// A byte-order mark is skipped. Throws UsageError with line and column of a syntax error or a NUL, or the line of a key
+  /// that is given twice, of values nested too deep and of a number too large.
+  JsonFile(const std::string& text, std::filesystem::path path);
 
   const std::filesystem::path& path() const { return path_; }
   JsonNode root() const;
@@ -68,6 +68,9 @@ class JsonNode {
   const Json* json_;
   std::string place_;
 };
+
+/// The value of a JSON file that no person writes, whose lines nobody asks for. Throws as JsonFile::read does.
+Json read_json(const std::filesystem::path& path);
 
 /// "; did you mean 'x'?", or nothing when no accepted name is near.
 std::string suggestion(std::string_view name, std::span<const std::string_view> accepted);

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "structures/mesh/error.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 namespace {
@@ -187,7 +188,7 @@ std::string_view context_kind_name(ContextKind kind) {
 ContextKind parse_context_kind(std::string_view name) {
   for (ContextKind kind : kKinds)
     if (context_kind_name(kind) == name) return kind;
-  throw UsageError(fmt::format("no context '{}'; accepted: {}", name, kKindNames));
+  throw UsageError(fmt::format("no context {}; accepted: {}", quote(name), kKindNames));
 }
 
 bool GlContextInfo::has_extension(std::string_view name) const {

@@ -10,7 +10,9 @@
 #include <cstring>
 #include <fstream>
 
+#include "structures/mesh/checked.hpp"
 #include "structures/mesh/error.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 namespace {
@@ -54,7 +56,7 @@ Picture shape_of(const std::string& header, const std::filesystem::path& path) {
   int h = 0, w = 0, c = 0;
   const std::string shape = header_value(header, "shape", path);
   if (std::sscanf(shape.c_str(), "(%9d, %9d, %9d", &h, &w, &c) != 3 || h < 1 || w < 1 || c < 1 || c > 16)
-    refuse(path, fmt::format("the npy shape is {}); accepted is (height, width, channels)", shape));
+    refuse(path, fmt::format("the npy shape is {}; accepted is (height, width, channels)", quote(shape + ")")));
   Picture picture;
   picture.width = w;
   picture.height = h;
@@ -113,14 +115,20 @@ Picture read_npy(const std::filesystem::path& path) {
   std::string header(length, ' ');
   if (!in.read(header.data(), static_cast<std::streamsize>(length))) refuse(path, "ends inside its npy header");
   const std::string type = header_value(header, "descr", path);
-  if (type != "'<f4'" && type != "'<f8'") refuse(path, fmt::format("the npy type is {}; accepted are '<f4' and '<f8'", type));
+  if (type != "'<f4'" && type != "'<f8'")
+    refuse(path, fmt::format("the npy type is {}; accepted are '<f4' and '<f8'", clipped(type)));
   if (header_value(header, "fortran_order", path) != "False") refuse(path, "is in Fortran order; accepted is C order");
   Picture picture = shape_of(header, path);
-  const std::uintmax_t bytes = type == "'<f4'" ? 4 : 8;
-  const std::uintmax_t count = std::uintmax_t(picture.width) * std::uintmax_t(picture.height) * std::uintmax_t(picture.channels);
-  const std::uintmax_t expected = kMagicBytes + length + count * bytes;
-  if (const auto actual = std::filesystem::file_size(path); actual != expected)
-    refuse(path, fmt::format("has {} bytes; its npy header asks for {}", actual, expected));
+  const std::int64_t bytes = type == "'<f4'" ? 4 : 8;
+  const CheckedSize numbers = CheckedSize(picture.width) * picture.height * picture.channels;
+  const CheckedSize expected = numbers * bytes + CheckedSize::of(kMagicBytes + length);
+  std::error_code failure;
+  const std::uintmax_t actual = std::filesystem::file_size(path, failure);
+  if (failure) refuse(path, reason_of(failure));
+  if (!expected.fits() || actual != static_cast<std::uintmax_t>(expected.or_most()))
+    refuse(path, fmt::format("has {} bytes; its npy header asks for {}", actual,
+                             expected.fits() ? std::to_string(expected.or_most()) : "more than 2^63"));
+  const auto count = static_cast<std::size_t>(numbers.or_most());
   if (bytes == 4)
     read_values<float>(in, picture, count, path);
   else

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "structures/mesh/quoted.hpp"
+
 namespace amrtex {
 
 namespace {
@@ -276,7 +278,7 @@ constexpr std::array<FieldType, 9> kFieldTypes{{{"constant", read_constant},
   std::vector<std::string_view> names;
   for (const FieldType& type : kFieldTypes) names.push_back(type.name);
   throw UsageError(fmt::format("generator key \"{}\": {} is not accepted; accepted: one of {}, or an object with such a \"type\"",
-                               path, value.dump(), fmt::join(names, ", ")));
+                               path, shown(value), fmt::join(names, ", ")));
 }
 
 const FieldType& find_type(const std::string& path, const Json& value) {

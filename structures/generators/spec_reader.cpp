@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "structures/mesh/error.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 
@@ -32,7 +33,7 @@ bool is_integer_within(const Json& value, std::int64_t lowest, std::int64_t high
 SpecReader::SpecReader(const Json& object, std::string path) : object_(object), path_(std::move(path)) {
   if (object.is_object()) return;
   throw UsageError(fmt::format("generator {}: {} is not accepted; accepted: a JSON object",
-                               path_.empty() ? std::string("specification") : fmt::format("key \"{}\"", path_), object.dump()));
+                               path_.empty() ? std::string("specification") : fmt::format("key \"{}\"", path_), shown(object)));
 }
 
 std::string SpecReader::path_of(std::string_view key) const {
@@ -48,7 +49,7 @@ const Json* SpecReader::find(std::string_view key) {
 void SpecReader::refuse(std::string_view key, std::string_view accepted) const {
   const auto it = object_.find(std::string(key));
   throw UsageError(fmt::format("generator key \"{}\": {} is not accepted; accepted: {}", path_of(key),
-                               it == object_.end() ? std::string("the default") : it->dump(), accepted));
+                               it == object_.end() ? std::string("the default") : shown(*it), accepted));
 }
 
 double SpecReader::number(std::string_view key, double fallback, std::string_view accepted, bool (*acceptable)(double)) {
@@ -104,8 +105,8 @@ Vec3d SpecReader::vector(std::string_view key, const Vec3d& fallback) {
 void SpecReader::finish() const {
   for (const auto& [key, value] : object_.items()) {
     if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
-    throw UsageError(fmt::format("unknown generator key \"{}\" (value {}); accepted here: {}", path_of(key), value.dump(),
-                                 fmt::join(known_, ", ")));
+    throw UsageError(fmt::format("unknown generator key \"{}\" (value {}); accepted here: {}", clipped(path_of(key)),
+                                 shown(value), fmt::join(known_, ", ")));
   }
 }
 

@@ -1,12 +1,14 @@
 #include "structures/mesh/amr_hierarchy.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <tbb/parallel_for.h>
 #include <xxhash.h>
 
+#include <atomic>
 #include <cmath>
 #include <utility>
+
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 namespace {
@@ -28,7 +30,7 @@ class PatchIndex {
       bounds_ = {glm::min(bounds_.lower, p.box.lower), glm::max(bounds_.upper, p.box.upper)};
       edges += std::cbrt(static_cast<double>(p.box.cells()));
     }
-    bin_ = std::max(1, static_cast<int>(edges / static_cast<double>(patches.size())));
+    bin_ = static_cast<int>(std::clamp(edges / static_cast<double>(patches.size()), 1.0, static_cast<double>(kWidestBin)));
     while (too_many_bins(patches)) bin_ *= 2;
     fill(patches);
   }
@@ -58,9 +60,9 @@ class PatchIndex {
   bool too_many_bins(std::span<const Patch> patches) {
     bins_ = ceil_div(bounds_.size(), bin_);
     if (Box{Vec3i(0), bins_}.cells() > (std::int64_t{1} << 22)) return true;
-    std::int64_t entries = 0;
+    CheckedSize entries;
     for (const Patch& p : patches) entries += bins_of(p.box).cells();
-    return entries > 16 * static_cast<std::int64_t>(patches.size()) + 4096;
+    return entries.or_most() > 16 * std::ssize(patches) + 4096;
   }
 
   void fill(std::span<const Patch> patches) {
@@ -73,6 +75,8 @@ class PatchIndex {
     for (std::size_t k = 0; k < patches.size(); ++k)
       for_each_cell(bins_of(patches[k].box), [&](const Vec3i& b) { patch_[next[all.offset(b)]++] = static_cast<int>(k); });
   }
+
+  static constexpr int kWidestBin = 1 << 30;  // eight of them hold any mesh of 31 bits
 
   Box bounds_;
   Vec3i bins_{0};
@@ -108,7 +112,9 @@ struct AmrHierarchy::Data {
   /// Cells of `fine` a cell of `coarse`, along an axis.
   int ratio(int coarse, int fine) const { return width_of(coarse) / width_of(fine); }
 
-  [[noreturn]] void refuse(const std::string& what) const { throw Error(fmt::format("data set {}: {}", mesh.name, what)); }
+  [[noreturn]] void refuse(const std::string& what) const {
+    throw Error(fmt::format("data set {}: {}", clipped(mesh.name), what));
+  }
 
   std::vector<int> patches_in(int level, const Box& box) const {
     std::vector<int> found;
@@ -124,7 +130,8 @@ struct AmrHierarchy::Data {
   void check_levels();
   void check_patches(int level) const;
   void mark_leaves(int level);
-  bool fully_refined(int level, const Vec3i& cell) const;
+  std::string mark_patch(int level, std::size_t patch);
+  bool covered(int level, const Box& box) const;
   void restrict_level(int level);
   void restrict_patch(int level, std::size_t patch, std::size_t field);
   Mean mean_of_leaves(int level, const Vec3i& cell, std::size_t field) const;
@@ -152,6 +159,8 @@ void AmrHierarchy::Data::check_levels() {
       refuse(fmt::format("level {} has {} cells along an axis; at most {} (31 bits of index) are supported", l + 1, finest,
                          kMaxIndex));
   }
+  for (const std::string& field : mesh.fields)
+    if (!is_utf8(field)) refuse(fmt::format("the name of the field {} is not UTF-8", quote(field)));
   cells.assign(mesh.levels.size(), mesh.root_cells);
   width.assign(mesh.levels.size(), 1);
   for (std::size_t l = 1; l < cells.size(); ++l) cells[l] = cells[l - 1] * mesh.ratios[l - 1];
@@ -185,38 +194,73 @@ void AmrHierarchy::Data::check_patches(int level) const {
                            text(list[static_cast<std::size_t>(other)].box)));
 }
 
-/// Is every part of the cell covered by patches of finer levels?
-bool AmrHierarchy::Data::fully_refined(int level, const Vec3i& cell) const {
-  if (level + 1 >= levels()) return false;
-  const Box children = Box{cell, cell + Vec3i(1)}.refined(ratio(level, level + 1));
-  bool full = true;
-  for_each_cell(children, [&](const Vec3i& child) {
-    if (full && at(level + 1).find(patches(level + 1), child) < 0) full = fully_refined(level + 1, child);
-  });
-  return full;
+/// Is every part of the box covered by patches of `level` and finer ones? Boxes are cut by patches and never walked cell by
+/// cell: a ratio may be so large that one cell has more children than anyone can visit.
+bool AmrHierarchy::Data::covered(int level, const Box& box) const {
+  std::vector<std::pair<int, Box>> open{{level, box}};
+  while (!open.empty()) {
+    auto [at_level, rest] = open.back();
+    open.pop_back();
+    const std::vector<int> found = patches_in(at_level, rest);
+    if (found.empty()) {
+      if (at_level + 1 == levels()) return false;
+      open.emplace_back(at_level + 1, rest.refined(ratio(at_level, at_level + 1)));
+      continue;
+    }
+    const Box inside = intersection(patches(at_level)[static_cast<std::size_t>(found.front())].box, rest);
+    for (int axis = 0; axis < 3; ++axis) {  // what lies before and behind the patch, along one axis after the other
+      Box before = rest;
+      Box behind = rest;
+      before.upper[axis] = rest.lower[axis] = inside.lower[axis];
+      behind.lower[axis] = rest.upper[axis] = inside.upper[axis];
+      if (!before.empty()) open.emplace_back(at_level, before);
+      if (!behind.empty()) open.emplace_back(at_level, behind);
+    }
+  }
+  return true;
+}
+
+/// Fills the patch's mask of leaves. Returns what is wrong with its first cell that is refined only in part, else "".
+std::string AmrHierarchy::Data::mark_patch(int level, std::size_t k) {
+  const Box& box = patches(level)[k].box;
+  auto& mask = leaf[static_cast<std::size_t>(level)][k];
+  mask.assign(static_cast<std::size_t>(box.cells()), 1);
+  for (int finer = level + 1; finer < levels(); ++finer) {
+    const int r = ratio(level, finer);
+    for (int other : patches_in(finer, box.refined(r))) {
+      const Box& fine = patches(finer)[static_cast<std::size_t>(other)].box;
+      const Box over = fine.coarsened(r);
+      const bool aligned = over.refined(r) == fine;
+      const auto cut = first_cell(intersection(over, box), [&](const Vec3i& cell) {
+        std::uint8_t& is_leaf = mask[box.offset(cell)];
+        const Box all{cell, cell + Vec3i(1)};
+        if (is_leaf != 0 && !aligned && !fine.contains(all.refined(r)) &&
+            !covered(level + 1, all.refined(ratio(level, level + 1))))
+          return true;
+        is_leaf = 0;
+        return false;
+      });
+      if (cut)
+        return fmt::format("level {}, patch {}: cell {} is refined only in part, by level {}, patch {}", level, k, text(*cut),
+                           finer, other);
+    }
+  }
+  return "";
 }
 
 void AmrHierarchy::Data::mark_leaves(int level) {
   auto& masks = leaf[static_cast<std::size_t>(level)];
   masks.resize(patches(level).size());
+  std::vector<std::string> problems(masks.size());
+  std::atomic<std::size_t> first = masks.size();  // patch with a problem: the same one at each run
   tbb::parallel_for(std::size_t{0}, masks.size(), [&](std::size_t k) {
-    const Box& box = patches(level)[k].box;
-    masks[k].assign(static_cast<std::size_t>(box.cells()), 1);
-    for (int finer = level + 1; finer < levels(); ++finer) {
-      const int r = ratio(level, finer);
-      for (int other : patches_in(finer, box.refined(r))) {
-        const Box& fine = patches(finer)[static_cast<std::size_t>(other)].box;
-        const Box covered = fine.coarsened(r);
-        const bool aligned = covered.refined(r) == fine;
-        for_each_cell(intersection(covered, box), [&](const Vec3i& cell) {
-          if (!aligned && !fine.contains(Box{cell, cell + Vec3i(1)}.refined(r)) && !fully_refined(level, cell))
-            refuse(fmt::format("level {}, patch {}: cell {} is refined only in part, by level {}, patch {}", level, k, text(cell),
-                               finer, other));
-          masks[k][box.offset(cell)] = 0;
-        });
-      }
+    if (k > first) return;
+    problems[k] = mark_patch(level, k);
+    if (problems[k].empty()) return;
+    for (std::size_t known = first; k < known && !first.compare_exchange_weak(known, k);) {
     }
   });
+  if (first < masks.size()) refuse(problems[first]);
 }
 
 void AmrHierarchy::Data::drop_non_finite() {
@@ -382,7 +426,7 @@ int AmrHierarchy::field_index(const std::string& field) const {
   const auto& all = fields();
   const auto it = std::find(all.begin(), all.end(), field);
   if (it == all.end())
-    throw UsageError(fmt::format("data set {}: no field '{}'; its fields are {}", name(), field, fmt::join(all, ", ")));
+    throw UsageError(fmt::format("data set {}: no field {}; its fields are {}", clipped(name()), quote(field), listed(all)));
   return static_cast<int>(it - all.begin());
 }
 

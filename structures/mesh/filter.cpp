@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "structures/mesh/error.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 namespace {
@@ -39,7 +40,7 @@ Filter parse_filter(std::string_view name) {
     if (filter_name(f) == name) return f;
   std::vector<std::string_view> names;
   for (Filter f : kFilters) names.push_back(filter_name(f));
-  throw UsageError(fmt::format("no filter '{}'; accepted: {}", name, fmt::join(names, ", ")));
+  throw UsageError(fmt::format("no filter {}; accepted: {}", quote(name), fmt::join(names, ", ")));
 }
 
 }  // namespace amrtex

@@ -8,6 +8,9 @@
 #include <algorithm>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
+
+#include "structures/mesh/checked.hpp"
 
 namespace amrtex {
 
@@ -33,10 +36,11 @@ struct Box {
   bool operator==(const Box&) const = default;
   Vec3i size() const { return upper - lower; }
   bool empty() const { return upper.x <= lower.x || upper.y <= lower.y || upper.z <= lower.z; }
+  /// How many; INT64_MAX where that takes more than 63 bits, which a domain may.
   std::int64_t cells() const {
     if (empty()) return 0;
     const Vec3i s = size();
-    return std::int64_t{s.x} * s.y * s.z;
+    return (CheckedSize(s.x) * CheckedSize(s.y) * CheckedSize(s.z)).or_most();
   }
   bool contains(const Vec3i& i) const {
     return i.x >= lower.x && i.y >= lower.y && i.z >= lower.z && i.x < upper.x && i.y < upper.y && i.z < upper.z;
@@ -66,6 +70,16 @@ void for_each_cell(const Box& box, F&& f) {
   for (int z = box.lower.z; z < box.upper.z; ++z)
     for (int y = box.lower.y; y < box.upper.y; ++y)
       for (int x = box.lower.x; x < box.upper.x; ++x) f(Vec3i(x, y, z));
+}
+
+/// The first cell of the box, x fastest, for which `f` holds.
+template <class F>
+std::optional<Vec3i> first_cell(const Box& box, F&& f) {
+  for (int z = box.lower.z; z < box.upper.z; ++z)
+    for (int y = box.lower.y; y < box.upper.y; ++y)
+      for (int x = box.lower.x; x < box.upper.x; ++x)
+        if (f(Vec3i(x, y, z))) return Vec3i(x, y, z);
+  return std::nullopt;
 }
 
 }  // namespace amrtex

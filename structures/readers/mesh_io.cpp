@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "structures/mesh/quoted.hpp"
 #include "structures/readers/amrex_plotfile/amrex_plotfile.hpp"
 
 namespace amrtex {
@@ -27,8 +28,7 @@ std::string known_formats() {
 }  // namespace
 
 MeshDescription read_mesh(const std::filesystem::path& path, const std::vector<std::string>& fields) {
-  std::error_code ignored;
-  if (!std::filesystem::exists(path, ignored)) throw Error(fmt::format("{}: no such file or folder", path.string()));
+  if (const std::string reason = why_absent(path); !reason.empty()) throw Error(fmt::format("{}: {}", path.string(), reason));
   for (const Format& format : kFormats)
     if (format.probe(path)) return format.read(path, fields);
   throw Error(fmt::format("{}: not in a format that can be read: {}", path.string(), known_formats()));

@@ -13,9 +13,9 @@
 #include <cstdint>
 #include <cstring>
 #include <glm/glm.hpp>
-#include <limits>
 #include <optional>
 
+#include "structures/mesh/checked.hpp"
 #include "structures/readers/reader_tools.hpp"
 
 namespace amrtex {
@@ -38,23 +38,15 @@ struct FabRange {
   std::uint64_t fab_end = 0;  ///< behind the last component
 };
 
-/// Product of two counts, nullopt where it takes more than 63 bits.
-inline std::optional<std::uint64_t> checked_product(std::uint64_t a, std::uint64_t b) {
-  constexpr auto kMost = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
-  if (b != 0 && a > kMost / b) return std::nullopt;
-  return a * b;
-}
-
 /// Where a component of a FAB of `size` cells (ghost cells included) stands whose values begin at byte
 /// `values_begin`; nullopt where that takes more than 63 bits, which no file can.
 inline std::optional<FabRange> fab_component_range(std::uint64_t values_begin, const Vec3l& size, std::uint64_t components,
                                                    std::uint64_t component, int bytes_per_value) {
-  constexpr auto kMost = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
-  std::optional<std::uint64_t> bytes = static_cast<std::uint64_t>(bytes_per_value);
-  for (int axis = 0; axis < 3 && bytes; ++axis) bytes = checked_product(*bytes, static_cast<std::uint64_t>(size[axis]));
-  const auto all = bytes ? checked_product(*bytes, components) : std::nullopt;
-  if (!all || values_begin > kMost || *all > kMost - values_begin) return std::nullopt;
-  return FabRange{values_begin + component * *bytes, *bytes, values_begin + *all};
+  const CheckedSize bytes = CheckedSize(bytes_per_value) * size.x * size.y * size.z;
+  const CheckedSize end = bytes * CheckedSize::of(components) + CheckedSize::of(values_begin);
+  if (!end.fits()) return std::nullopt;
+  const auto each = static_cast<std::uint64_t>(bytes.or_most());
+  return FabRange{values_begin + component * each, each, static_cast<std::uint64_t>(end.or_most())};
 }
 
 /// One of the lists `(n, (a b c ...))` of a real descriptor; at most 8 numbers.

@@ -1,0 +1,154 @@
+#include "structures/readers/amrex_plotfile/amrex_data.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <limits>
+
+#include "structures/mesh/quoted.hpp"
+
+namespace amrtex {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kFabLineBytes = 1024;                   // the longest line that AMReX writes has some 200
+constexpr std::uint64_t kReadBytes = std::uint64_t{1} << 20;  // read at a time and thread, or one row where that is longer
+
+/// A data file opened for reads at any position, from any thread.
+class DataFile {
+ public:
+  explicit DataFile(const fs::path& path) : path_(path.string()), descriptor_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
+    if (descriptor_ < 0) throw Error(fmt::format("{}: {}", path_, reason_of({errno, std::generic_category()})));
+  }
+  ~DataFile() { ::close(descriptor_); }
+  DataFile(const DataFile&) = delete;
+  DataFile& operator=(const DataFile&) = delete;
+
+  void read(std::uint64_t offset, std::byte* out, std::size_t bytes) const {
+    while (bytes > 0) {
+      const ssize_t got = ::pread(descriptor_, out, bytes, static_cast<off_t>(offset));
+      if (got < 0 && errno == EINTR) continue;
+      if (got <= 0)
+        throw Error(fmt::format("{}: {} bytes at {} cannot be read: {}", path_, bytes, offset,
+                                got < 0 ? reason_of({errno, std::generic_category()}) : "the file ends"));
+      out += got;
+      offset += static_cast<std::uint64_t>(got);
+      bytes -= static_cast<std::size_t>(got);
+    }
+  }
+
+ private:
+  std::string path_;
+  int descriptor_;
+};
+
+/// Reads the FAB line in front of the values, checks that it is the patch that `Cell_H` means.
+void scan_fab_line(FabSource& fab, std::uint64_t offset, std::uint64_t file_size, const PlotHeader& header) {
+  std::string line(static_cast<std::size_t>(std::min<std::uint64_t>(kFabLineBytes, file_size - offset)), '\0');
+  DataFile(*fab.file).read(offset, reinterpret_cast<std::byte*>(line.data()), line.size());
+  const std::size_t length = std::min(line.find('\n'), line.size());
+  const bool ends = length < line.size();
+  line.resize(length);
+  TextScanner in(fmt::format("{}, FAB at byte {}", fab.file->string(), offset), std::move(line), false);
+  if (leads_out_of(header.folder, *fab.file)) in.hide_text();
+  in.expect("FAB", "the line in front of a patch");
+  fab.format = scan_real_format(in);
+  const IndexBox box = scan_box(in, "the box of the FAB");
+  if (box != fab.stored) in.fail(fmt::format("its box is {}, but Cell_H makes it {}", text(box), text(fab.stored)));
+  const std::int64_t count = in.integer("the number of components", 0, std::numeric_limits<std::int32_t>::max());
+  if (count != std::ssize(header.fields))
+    in.fail(fmt::format("{} components, but Header names {} fields", count, header.fields.size()));
+  if (!ends || in.peek() != '\0') in.fail("its first line does not end behind the number of components");
+  fab.values_begin = offset + length + 1;
+}
+
+/// The patch's place in its file, which must hold all of it. Returns the bytes that it takes.
+std::uint64_t locate_fab(FabSource& fab, const CellHeader& cells, std::size_t patch, std::uint64_t file_size,
+                         const PlotHeader& header) {
+  const std::size_t components = header.fields.size();
+  const std::uint64_t offset = cells.fabs[patch].offset;
+  if (offset >= file_size)
+    throw Error(fmt::format("{}: patch {} is said to begin at byte {}, but the file has only {}", fab.file->string(), patch,
+                            offset, file_size));
+  fab.valid = cells.boxes[patch];
+  fab.stored = {fab.valid.lower - cells.ghosts, fab.valid.upper + cells.ghosts};
+  fab.values_begin = offset;
+  if (cells.format)
+    fab.format = *cells.format;
+  else
+    scan_fab_line(fab, offset, file_size, header);
+  const auto range = fab_component_range(fab.values_begin, fab.stored.size(), components, 0, fab.format.bytes);
+  if (!range || range->fab_end > file_size)
+    throw Error(fmt::format("{}: too short, {} bytes; patch {} {} of {} components needs {} from byte {} on", fab.file->string(),
+                            file_size, patch, text(fab.stored), components,
+                            range ? fmt::format("{} bytes", range->fab_end - fab.values_begin) : "more than 2^63 bytes",
+                            fab.values_begin));
+  return range->fab_end - fab.values_begin;
+}
+
+/// One component without its ghost cells, a few rows at a time.
+void read_component(const DataFile& file, const FabSource& fab, std::uint64_t components, std::uint64_t component,
+                    std::vector<double>& out) {
+  const Vec3l stored = fab.stored.size();
+  const Vec3l size = fab.valid.size();
+  const Vec3l skip = fab.valid.lower - fab.stored.lower;
+  const auto value_bytes = static_cast<std::uint64_t>(fab.format.bytes);
+  const auto row_bytes = static_cast<std::uint64_t>(stored.x) * value_bytes;
+  const auto rows_at_once = static_cast<std::int64_t>(std::max<std::uint64_t>(1, kReadBytes / row_bytes));
+  const std::uint64_t begin = fab_component_range(fab.values_begin, stored, components, component, fab.format.bytes)->begin;
+  std::vector<std::byte> buffer(static_cast<std::size_t>(row_bytes) * static_cast<std::size_t>(std::min(rows_at_once, size.y)));
+  double* target = out.data();
+  for (std::int64_t z = 0; z < size.z; ++z)
+    for (std::int64_t y = 0; y < size.y; y += rows_at_once) {
+      const std::int64_t rows = std::min(rows_at_once, size.y - y);
+      const auto first_row = static_cast<std::uint64_t>((z + skip.z) * stored.y + y + skip.y);
+      file.read(begin + first_row * row_bytes, buffer.data(),
+                static_cast<std::size_t>(row_bytes) * static_cast<std::size_t>(rows));
+      for (std::int64_t row = 0; row < rows; ++row, target += size.x)
+        decode_reals(
+            buffer.data() + static_cast<std::uint64_t>(row) * row_bytes + static_cast<std::uint64_t>(skip.x) * value_bytes,
+            static_cast<std::size_t>(size.x), fab.format, target);
+    }
+}
+
+}  // namespace
+
+LevelSources locate_level(const PlotHeader& header, std::size_t level) {
+  const CellHeader cells = scan_cell_header(header, level);
+  const fs::path folder = header.levels[level].cell_header.parent_path();
+  LevelSources sources;
+  sources.fabs.resize(cells.boxes.size());
+  std::uint64_t present = 0;
+  std::uint64_t claimed = 0;
+  for (std::size_t patch = 0; patch < cells.boxes.size(); ++patch) {
+    const auto [file, is_new] = sources.files.try_emplace(cells.fabs[patch].file);
+    if (is_new) {
+      file->second = {folder / file->first, regular_file_size(folder / file->first)};
+      present += file->second.second;
+    }
+    sources.fabs[patch].file = &file->second.first;
+    claimed += locate_fab(sources.fabs[patch], cells, patch, file->second.second, header);
+    if (claimed > present)
+      throw Error(fmt::format("{}: its patches take {} bytes, but the data files have only {}; some must share their bytes",
+                              header.levels[level].cell_header.string(), claimed, present));
+  }
+  return sources;
+}
+
+std::vector<std::vector<double>> read_components(const FabSource& fab, std::size_t components,
+                                                 const std::vector<std::size_t>& wanted) {
+  const DataFile file(*fab.file);
+  const Vec3l size = fab.valid.size();
+  std::vector<std::vector<double>> values(wanted.size());
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    values[i].resize(static_cast<std::size_t>(size.x * size.y * size.z));  // the file holds them, so that they fit
+    read_component(file, fab, components, wanted[i], values[i]);
+  }
+  return values;
+}
+
+}  // namespace amrtex

@@ -1,0 +1,37 @@
+// Where the values of a level's patches stand in its data files, and reading them.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "structures/readers/amrex_plotfile/amrex_header.hpp"
+
+namespace amrtex {
+
+/// A patch's values in a data file.
+struct FabSource {
+  const std::filesystem::path* file = nullptr;
+  std::uint64_t values_begin = 0;
+  RealFormat format;
+  IndexBox stored;  ///< with ghost cells
+  IndexBox valid;
+};
+
+struct LevelSources {
+  std::map<std::string, std::pair<std::filesystem::path, std::uint64_t>> files;  ///< by name: path and size in bytes
+  std::vector<FabSource> fabs;
+};
+
+/// Finds every patch of a level. Together they may not claim more bytes than there
+/// are, else a small file could make us allocate without bound by naming the same bytes many times.
+LevelSources locate_level(const PlotHeader& header, std::size_t level);
+
+/// Reads one array a wanted component, without ghost cells, x fastest.
+std::vector<std::vector<double>> read_components(const FabSource& fab, std::size_t components,
+                                                 const std::vector<std::size_t>& wanted);
+
+}  // namespace amrtex
