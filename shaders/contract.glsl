@@ -48,14 +48,14 @@ DEFINE_INT(AMRTEX_FIELD_RANGES)
 DEFINE_INT(AMRTEX_SCALED_STORAGE)
 DEFINE_INT(AMRTEX_LEVEL_OF_DETAIL)
 
-// the same numbers as enum class Filter (asserted in renderers/cpu/cpu_field.cpp.in)
+// the same numbers as enum class Filter (structures/mesh/filter.hpp; tests/filter_test.cpp compares)
 #define AMRTEX_FILTER_NEAREST 0
 #define AMRTEX_FILTER_LINEAR_LOD 1
 #define AMRTEX_FILTER_LINEAR_PAGE 2
 #define AMRTEX_FILTER_LINEAR_VERTEX 3
 #define AMRTEX_FILTER_BASIS 4
 
-// the same number as kMostFields (asserted there too)
+// the same number as kMostFields (asserted in renderers/cpu/cpu_field.cpp.in)
 #define AMRTEX_MOST_FIELDS 4
 
 #define AMRTEX_NO_RANGE 0xffffffffu  // coded range of a region without mesh

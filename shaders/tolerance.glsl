@@ -1,6 +1,12 @@
 // The integrator that chooses its intervals, so that a channel of a pixel is off by no more than what was asked.
 // An interval is the two pre-integrated halves between three samples. How far the middle one is off the line between the
 // ends says what the halves are still off (a parabola through the three), and corrects them.
+#if !AMRTEX_CPP
+#ifndef AMRTEX_CONTINUOUS
+#error AMRTEX_CONTINUOUS must be defined: 1 where the filter is continuous everywhere, else 0
+#endif
+#endif
+DEFINE_INT(AMRTEX_CONTINUOUS)
 UNIFORM(real, u_interval_error)  // that one interval may have
 UNIFORM(real, u_longest)         // interval, in cell widths of the region
 
@@ -110,8 +116,7 @@ void take_even_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q, IN(real)
 // Does the value at the end of the region before hold at the beginning of this one?
 bool end_continues(IN(Accumulation) a, IN(Region) r) {
   if (AMRTEX_VALIDITY != 0 || a.end_level < 0) return false;
-  bool everywhere = AMRTEX_FILTER == AMRTEX_FILTER_LINEAR_VERTEX || AMRTEX_FILTER == AMRTEX_FILTER_BASIS;
-  return everywhere || a.end_level == r.level;
+  return AMRTEX_CONTINUOUS != 0 || a.end_level == r.level;
 }
 
 // Marches a region from its q0 on, over `length`; dq a unit of length. Ends where the transmittance falls to `least`.

@@ -1,5 +1,5 @@
 // Triangles that a ray meets: it ends at the first of them, which shows through what was gathered in front of it. Where rays meet them was
-// found on the host (renderers/consumers/triangle_layer.hpp). Scenes without triangles do not include this file.
+// found on the host (renderers/scene/triangle_layer.hpp). Scenes without triangles do not include this file.
 DEFINE_INT(AMRTEX_TRIANGLES)  // how many objects they belong to
 
 UNIFORM_ARRAY(real, u_triangle_colors, 3 * AMRTEX_TRIANGLES, 48)  // rgb of each

@@ -383,8 +383,8 @@ TEST(Counts, OfAnAxisParallelRayAreTheIntervalsOfItsLength) {
       Scene scene = scene_of(Mode::projection, orthographic({1, 0.5, 0.5}, {1, 0, 0}, 2));
       scene.settings.step = step;
       const EncodedField field = build(h, c, {.value_ranges = false});
-      const GpuField gpu(field, context(ContextKind::egl));
-      const WorkCounts counts = Raycaster(context(ContextKind::egl), h, field, gpu, scene).count();
+      const Structure structure(context(ContextKind::egl), field);
+      const WorkCounts counts = Raycaster(context(ContextKind::egl), h, structure, scene).count();
       EXPECT_EQ(counts.rays, kPixels * kPixels / 4) << "the mesh is half of the picture high and wide";
       EXPECT_EQ(counts.samples, counts.rays * static_cast<std::int64_t>(std::ceil(16 / step)));
       EXPECT_GE(counts.regions, counts.rays);
@@ -401,8 +401,8 @@ TEST(Counts, OfAdaptiveRaysOnOneLevelAreTheCells) {
       Scene scene = scene_of(Mode::projection, orthographic({2, 0.5, 0.5}, {-1, 0, 0}, 0.5), Sampling::adaptive);
       scene.settings.step = 1.0 / samples;
       const EncodedField field = build(h, c);
-      const GpuField gpu(field, context(ContextKind::egl));
-      const WorkCounts counts = Raycaster(context(ContextKind::egl), h, field, gpu, scene).count();
+      const Structure structure(context(ContextKind::egl), field);
+      const WorkCounts counts = Raycaster(context(ContextKind::egl), h, structure, scene).count();
       EXPECT_EQ(counts.samples, counts.rays * 16 * samples);
     }
   });

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "renderers/bindings/scene_needs.hpp"
 #include "structures/generators/synthetic.hpp"
 #include "tests/pictures.hpp"
 
@@ -38,8 +39,8 @@ ChangeTimes changes(const AmrHierarchy& h, const Scene& scene, int times, const 
   request.parameters = complete_parameters(find_encoding(encoding), Json::object());
   request.context = context(ContextKind::egl).info();
   const EncodedField field = find_encoding(encoding).build(h, request);
-  const GpuField gpu(field, context(ContextKind::egl));
-  return time_changes(context(ContextKind::egl), h, field, gpu, scene, times);
+  const Structure structure(context(ContextKind::egl), field);
+  return time_changes(context(ContextKind::egl), h, structure, scene, times);
 }
 
 TEST(ChangedScene, HasItsPointsAndIsovaluesMovedByAHundredthOfTheirRange) {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "renderers/consumers/box_consumer.hpp"
-#include "renderers/scene/scene_bindings.hpp"
+#include "renderers/bindings/scene_bindings.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {
@@ -56,8 +56,8 @@ double off_closed_form(const Picture& picture, const Scene& scene, double extinc
 Picture draw_boxes(const AmrHierarchy& h, const EncodingCase& c, const Scene& scene) {
   Context& gl = context(ContextKind::egl);
   const EncodedField field = build(h, c, {.draw_boxes = true});
-  const GpuField gpu(field, gl);
-  BoxConsumer consumer(gl, h, field, gpu, scene);
+  const Structure structure(gl, field);
+  BoxConsumer consumer(gl, h, structure, scene);
   consumer.draw();
   return consumer.read();
 }

@@ -13,7 +13,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "bench/measure/image_error.hpp"
+#include "bench/numbers/image_error.hpp"
 #include "bench/records/record.hpp"
 #include "renderers/scene/picture.hpp"
 #include "structures/generators/synthetic.hpp"

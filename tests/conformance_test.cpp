@@ -6,7 +6,7 @@
 #include <set>
 
 #include "renderers/consumers/raycaster.hpp"
-#include "renderers/scene/scene_bindings.hpp"
+#include "renderers/bindings/scene_bindings.hpp"
 #include "shaders/shader_library.hpp"
 #include "tests/pictures.hpp"
 
@@ -99,7 +99,7 @@ TEST(Conformance, TheDomainsLastFaceBelongsToItsLastCellAndBeyondIsNothing) {
     for (const ProbeResult& r : probe_on_cpu(h, field, Precision::double_precision, outside)) EXPECT_FALSE(r.found);
     const EncodedField floats = build(h, c);
     Context& egl = context(ContextKind::egl);
-    for (const ProbeResult& r : probe_on_gl(egl, h, floats, GpuField(floats, egl), outside)) EXPECT_FALSE(r.found);
+    for (const ProbeResult& r : probe_on_gl(egl, h, Structure(egl, floats), outside)) EXPECT_FALSE(r.found);
   });
 }
 
@@ -118,7 +118,7 @@ TEST(Conformance, FractionsThatRoundToOneStayInTheirCell) {
     EXPECT_TRUE(on_cpu) << on_cpu;
     Context& egl = context(ContextKind::egl);
     const Comparison on_gl =
-        compare(positions, expected, probe_on_gl(egl, h, field, GpuField(field, egl), positions), 1e-5 * value_range(h));
+        compare(positions, expected, probe_on_gl(egl, h, Structure(egl, field), positions), 1e-5 * value_range(h));
     EXPECT_TRUE(on_gl) << on_gl;
   }
 }
@@ -134,7 +134,7 @@ TEST(Conformance, ManualFilteringOnGlIsTheReferenceAndTheCpusBits) {
           const auto positions = probe_positions(h, 40);
           const EncodedField field = build(h, c);
           Context& gl = context(kind);
-          const auto on_gl = probe_on_gl(gl, h, field, GpuField(field, gl), positions);
+          const auto on_gl = probe_on_gl(gl, h, Structure(gl, field), positions);
           const Comparison with_reference =
               compare(positions, reference_values(h, field.definition, positions), on_gl, 1e-5 * value_range(h));
           EXPECT_TRUE(with_reference) << with_reference;
@@ -163,7 +163,7 @@ TEST(Conformance, HardwareFilteringDiffersByTheTextureCoordinateAlone) {
           const EncodedField field = build(h, c, {.filtering = Filtering::hardware});
           EXPECT_EQ(field.filtering, Filtering::hardware);
           Context& gl = context(kind);
-          const auto on_gl = probe_on_gl(gl, h, field, GpuField(field, gl), positions);
+          const auto on_gl = probe_on_gl(gl, h, Structure(gl, field), positions);
           const Comparison result = compare(
               positions, reference_values(h, field.definition, positions), on_gl,
               [&](std::size_t i) { return 0x1p-12 * local_range(h, on_gl[i].level, positions[i]) + 1e-5 * value_range(h); });
@@ -184,7 +184,7 @@ TEST(Conformance, NearestHasTheLeafsBitsInEveryEncoding) {
       leaves.push_back(std::isnan(v) ? std::nullopt : std::optional(static_cast<double>(static_cast<float>(v))));
     }
     const EncodedField field = build(h, c);
-    const Comparison on_gl = compare(positions, leaves, probe_on_gl(gl, h, field, GpuField(field, gl), positions), 0.0);
+    const Comparison on_gl = compare(positions, leaves, probe_on_gl(gl, h, Structure(gl, field), positions), 0.0);
     EXPECT_TRUE(on_gl) << on_gl;
     const Comparison on_cpu = compare(positions, leaves, probe_on_cpu(h, field, Precision::single_precision, positions), 0.0);
     EXPECT_TRUE(on_cpu) << on_cpu;
@@ -216,7 +216,7 @@ TEST(Conformance, StorageErrsByHalfAQuantum) {
         const Comparison exact = compare(positions, expected, in_double, (bound + 1e-12) * value_range(h));
         EXPECT_TRUE(exact) << exact;
         EXPECT_GT(exact.worst, bound * value_range(h) / 16) << "the payload is of this storage";
-        const Comparison on_gl = compare(positions, expected, probe_on_gl(gl, h, field, GpuField(field, gl), positions),
+        const Comparison on_gl = compare(positions, expected, probe_on_gl(gl, h, Structure(gl, field), positions),
                                          (bound + 1e-6) * value_range(h));
         EXPECT_TRUE(on_gl) << on_gl;
       }
@@ -396,7 +396,7 @@ TEST(Conformance, VerticesMakeAFieldWithoutJumpsAcrossFacesEdgesAndCornersOfAnyL
       if (c.filter != Filter::linear_vertex && c.filter != Filter::linear_lod) continue;
       SCOPED_TRACE(name + ": " + c.name());
       const EncodedField floats = build(h, c);
-      const double on_gl = largest_jump(places, probe_on_gl(gl, h, floats, GpuField(floats, gl), positions)) / value_range(h);
+      const double on_gl = largest_jump(places, probe_on_gl(gl, h, Structure(gl, floats), positions)) / value_range(h);
       if (c.filter == Filter::linear_lod) {
         EXPECT_GT(on_gl, 1e-3);
         continue;
@@ -441,9 +441,9 @@ TEST(Conformance, MissingValuesSpreadNoFurtherThanTheFootprint) {
     for (const Filtering filtering : c.filterings()) {
       const EncodedField field = build(missing, c, {.filtering = filtering});
       Context& gl = context(ContextKind::egl);
-      for (const ProbeResult& r : probe_on_gl(gl, missing, field, GpuField(field, gl), far))
+      for (const ProbeResult& r : probe_on_gl(gl, missing, Structure(gl, field), far))
         EXPECT_TRUE(r.found && std::isfinite(r.value));
-      for (const ProbeResult& r : probe_on_gl(gl, missing, field, GpuField(field, gl), within)) EXPECT_FALSE(r.found);
+      for (const ProbeResult& r : probe_on_gl(gl, missing, Structure(gl, field), within)) EXPECT_FALSE(r.found);
     }
   }
 }
@@ -520,11 +520,11 @@ TEST(SeveralFields, EachHasTheBitsOfAStructureOfItsOwnOnGl) {
     const bool scaled = c.filter == Filter::nearest;  // either storage is compiled in some case
     const Storage storage = scaled ? Storage::r16 : Storage::r32f;
     const EncodedField both = build(h, c, {.storage = storage, .more_fields = {1}});
-    const GpuField gpu(both, gl);
+    const Structure structure(gl, both);
     for (const int number : {0, 1}) {
       const EncodedField alone = build(h, c, {.storage = storage, .field = number});
-      expect_same(positions, probe_on_gl(gl, h, alone, GpuField(alone, gl), positions),
-                  probe_on_gl(gl, h, both, gpu, positions, number), fmt::format("field {}", number));
+      expect_same(positions, probe_on_gl(gl, h, Structure(gl, alone), positions),
+                  probe_on_gl(gl, h, structure, positions, number), fmt::format("field {}", number));
     }
   });
 }
@@ -538,12 +538,12 @@ TEST(SeveralFields, HardwareFilteringReadsTheTextureOfItsField) {
     SCOPED_TRACE(c.name());
     if (!accepted(h, c, {.filtering = Filtering::hardware, .more_fields = {1}})) continue;
     const EncodedField both = build(h, c, {.filtering = Filtering::hardware, .more_fields = {1}});
-    const GpuField gpu(both, gl);
+    const Structure structure(gl, both);
     for (const int number : {0, 1}) {
       const EncodedField manual = build(h, c, {.field = number});
       const FieldStatistics& s = h.statistics(number);
       const Comparison result = compare(positions, values_of(probe_on_cpu(h, manual, Precision::single_precision, positions)),
-                                        probe_on_gl(gl, h, both, gpu, positions, number), 0x1p-11 * (s.max - s.min));
+                                        probe_on_gl(gl, h, structure, positions, number), 0x1p-11 * (s.max - s.min));
       EXPECT_TRUE(result) << result;
     }
   }
@@ -573,8 +573,8 @@ TEST(SeveralFields, ThePictureIsThatOfTheFirstAlone) {
       if (mode == Mode::mip && c.filter != Filter::nearest) continue;  // the other marching loop: it knows no filter
       const Scene scene = askew(h, mode);
       const auto draw = [&](const EncodedField& field) {
-        const GpuField gpu(field, gl);
-        Raycaster raycaster(gl, h, field, gpu, scene);
+        const Structure structure(gl, field);
+        Raycaster raycaster(gl, h, structure, scene);
         raycaster.draw();
         return raycaster.read().values;
       };
@@ -623,9 +623,9 @@ TEST(SeveralFields, FourAreTakenAndFiveRefused) {
     SCOPED_TRACE(c.name());
     if (!accepted(h, c, {.more_fields = {1}})) continue;
     const EncodedField four = build(h, c, {.more_fields = {1, 0, 1}});
-    const GpuField gpu(four, gl);
-    expect_same(positions, probe_on_gl(gl, h, four, gpu, positions, 1), probe_on_gl(gl, h, four, gpu, positions, 3), "3 is 1");
-    EXPECT_THROW(probe_on_gl(gl, h, four, gpu, positions, 4), UsageError);
+    const Structure structure(gl, four);
+    expect_same(positions, probe_on_gl(gl, h, structure, positions, 1), probe_on_gl(gl, h, structure, positions, 3), "3 is 1");
+    EXPECT_THROW(probe_on_gl(gl, h, structure, positions, 4), UsageError);
     EXPECT_THROW(probe_on_cpu(h, four, Precision::single_precision, positions, 4), UsageError);
     EXPECT_THROW(build(h, c, {.more_fields = {2}}), UsageError) << "the mesh has two";
     try {
@@ -758,7 +758,7 @@ TEST(MutationControl, CorruptedTexturesReachTheGlContextToo) {
       const Values expected = reference_values(h, field.definition, positions);
       for_each_value_texture(field, [](HostTexture& t) { std::rotate(t.data.begin(), t.data.begin() + 4, t.data.end()); });
       EXPECT_FALSE(
-          compare(positions, expected, probe_on_gl(gl, h, field, GpuField(field, gl), positions), 1e-3 * value_range(h)));
+          compare(positions, expected, probe_on_gl(gl, h, Structure(gl, field), positions), 1e-3 * value_range(h)));
     }
 }
 

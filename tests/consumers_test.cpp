@@ -3,6 +3,7 @@
 
 #include <set>
 
+#include "renderers/consumers/make_consumer.hpp"
 #include "renderers/consumers/screen_polygons.hpp"
 #include "structures/generators/random_mesh.hpp"
 #include "tests/pictures.hpp"
@@ -169,8 +170,8 @@ Scene cloud_scene(const View& view, ConsumerKind consumer, Sampling sampling = S
 Picture draw_scene(const AmrHierarchy& h, const EncodingCase& c, const Scene& scene, WorkCounts* counts = nullptr) {
   Context& gl = context(ContextKind::egl);
   const EncodedField field = build(h, c, {.draw_boxes = scene.settings.consumer != ConsumerKind::raycast});
-  const GpuField gpu(field, gl);
-  const auto consumer = make_consumer(gl, h, field, gpu, scene);
+  const Structure structure(gl, field);
+  const auto consumer = make_consumer(gl, h, structure, scene);
   consumer->draw();
   Picture picture = consumer->read();
   if (counts != nullptr) *counts = consumer->count();
@@ -307,9 +308,9 @@ TEST(Slices, OneByOneTakeAPixelOnceWhereBoxesOverlap) {
   for (const ConsumerKind consumer : {ConsumerKind::slices, ConsumerKind::stencil_slices}) {
     const Scene scene = cloud_scene(views()[0].view, consumer, Sampling::adaptive);
     EncodedField field = build(h, kd_case(Filter::linear_lod), {.draw_boxes = true});
-    const GpuField gpu(field, gl);
+    const Structure structure(gl, field);
     const auto drawn = [&] {
-      const auto c = make_consumer(gl, h, field, gpu, scene);
+      const auto c = make_consumer(gl, h, structure, scene);
       c->draw();
       return c->read().values;
     };

@@ -115,7 +115,7 @@ TEST(Differential, GlIsTheReferenceAndTheCpusBitsOnRandomMeshes) {
         const auto field = refusals.try_build(h, c, {.filtering = filtering, .limits = handle_limits(kind)});
         if (!field) continue;
         Context& gl = context(kind);
-        const auto on_gl = probe_on_gl(gl, h, *field, GpuField(*field, gl), positions);
+        const auto on_gl = probe_on_gl(gl, h, Structure(gl, *field), positions);
         const double hardware = filtering == Filtering::hardware ? 0x1p-12 : 0;
         const Comparison result =
             compare(positions, reference_values(h, field->definition, positions), on_gl, [&](std::size_t i) {

@@ -17,33 +17,30 @@ constexpr double kStep = 1.0 / 16;  // of the reference, finest cells
 struct Explained {
   const AmrHierarchy& hierarchy;
   EncodingCase c;
-  BuildRequest request;
-  EncodedField field;
-  std::unique_ptr<GpuField> gpu;
+  std::optional<Structure> structure;
 
   Explained(const AmrHierarchy& h, const EncodingCase& encoding_case, Storage storage = Storage::r32f,
             Filtering filtering = Filtering::manual)
       : hierarchy(h), c(encoding_case) {
+    BuildRequest request;
     request.storage = storage;
     request.needs.filter = c.filter;
     request.needs.filtering = filtering;
     request.parameters = c.parameters;
     request.context = gl().info();
-    field = c.encoding->build(h, request);
-    upload();
+    structure.emplace(gl(), c.encoding->build(h, request), request);
   }
 
   static Context& gl() { return context(ContextKind::egl); }
-  void upload() { gpu = std::make_unique<GpuField>(field, gl()); }
 
   Picture picture(const Scene& scene) const {
-    Raycaster raycaster(gl(), hierarchy, field, *gpu, scene);
+    Raycaster raycaster(gl(), hierarchy, *structure, scene);
     raycaster.draw();
     return raycaster.read();
   }
   ErrorSplit split(const Scene& scene, const AnalyticField* truth = nullptr) const {
-    const Picture reference = HierarchyReference(hierarchy, 0, field.definition).render(scene, kStep);
-    return split_error({hierarchy, *c.encoding, request, field, *gpu, gl(), scene, reference, picture(scene), kStep, truth});
+    const Picture reference = HierarchyReference(hierarchy, 0, structure->field.definition).render(scene, kStep);
+    return split_error({hierarchy, *c.encoding, *structure, gl(), scene, reference, picture(scene), kStep, truth});
   }
 };
 
@@ -82,7 +79,7 @@ TEST(ErrorSplit, ClosesForEveryEncodingAndMode) {
     const ErrorSplit split = explained.split(scene_of_mode(mode, sampling));
     // a sum of at most 8 doubles of pictures below 16, and the context draws the same floats twice
     EXPECT_LE(split.sum_closes, 16 * 8 * 0x1p-52);
-    EXPECT_EQ(split.of("filtering").has_value(), explained.field.filtering == Filtering::hardware);
+    EXPECT_EQ(split.of("filtering").has_value(), explained.structure->field.filtering == Filtering::hardware);
     EXPECT_FALSE(split.of("early_end"));
   });
 }
@@ -268,9 +265,9 @@ TEST(ErrorSplit, ATextureThatIsSpoiltOnTheContextIsTheDriversError) {
   const AmrHierarchy h = nested(waves).hierarchy();
   const EncodingCase c = page_table(Filter::linear_page);
   Explained explained(h, c);
-  EncodedField spoilt = explained.field;
+  EncodedField spoilt = explained.structure->field;
   mutate(spoilt);
-  explained.gpu = std::make_unique<GpuField>(spoilt, Explained::gl());
+  explained.structure->gpu = GpuField(spoilt, Explained::gl());
   const ErrorSplit split = explained.split(scene_of_mode(Mode::projection));
   EXPECT_LE(worst(split, "encoding"), 1e-12);
   EXPECT_LT(worst(split, "arithmetic"), 1e-4);

@@ -2,10 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "renderers/bindings/scene_needs.hpp"
 #include "renderers/consumers/box_consumer.hpp"
-#include "renderers/consumers/consumer.hpp"
+#include "renderers/consumers/make_consumer.hpp"
 #include "renderers/cpu/sampled_reference.hpp"
-#include "renderers/scene/scene_bindings.hpp"
+#include "renderers/bindings/scene_bindings.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {
@@ -341,8 +342,8 @@ TEST(Fields, AreRefusedByNameWhereTheyCannotBeDrawn) {
   }
   Scene boxes = good;
   boxes.settings.consumer = ConsumerKind::multipass;
-  const GpuField gpu(field, context(ContextKind::egl));
-  EXPECT_THROW(make_consumer(context(ContextKind::egl), h, field, gpu, boxes), UnsupportedError);
+  const Structure structure(context(ContextKind::egl), field);
+  EXPECT_THROW(make_consumer(context(ContextKind::egl), h, structure, boxes), UnsupportedError);
   try {
     HierarchyReference(h, 0, {}).render(fields_scene(Sampling::adaptive, peaks(), {{"rho", peaks()}}), 1);
     ADD_FAILURE();

@@ -1,4 +1,4 @@
-#include "bench/measure/image_error.hpp"
+#include "bench/numbers/image_error.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -5,7 +5,7 @@
 #include <array>
 #include <map>
 
-#include "bench/measure/image_error.hpp"
+#include "bench/numbers/image_error.hpp"
 #include "structures/generators/synthetic.hpp"
 #include "tests/pictures.hpp"
 
@@ -322,13 +322,13 @@ TEST(NoValue, HalfOfAnIntervalBesideItHasTheOtherEndsLight) {
 TEST(Tolerance, IsReachedByNinetyFivePixelsOfAHundredWithFewerSamplesThanAnyStep) {
   const AmrHierarchy h(generate_mesh(Json::parse(R"({"field": "blobs_shell", "levels": 2})")));
   const EncodedField field = build(h, a_case("page_table", Filter::linear_page));
-  const GpuField gpu(field, context(ContextKind::egl));
+  const Structure structure(context(ContextKind::egl), field);
   Scene scene = scene_of(Integrator::tolerance, perspective({2.32, 1.87, 1.53}, Vec3d(0.5)), Sampling::adaptive, 64);
   scene.transfer_function.extinction = {{0.17, 0}, {0.2, 60}, {0.23, 0}, {0.57, 0}, {0.6, 120}, {0.63, 0}};
   scene.transfer_function.color = {{0, {0, 0, 0.3}}, {0.3, {0.9, 0.2, 0.1}}, {0.6, {0.2, 0.8, 0.9}}};
   const Picture reference = HierarchyReference(h, 0, field.definition).render(scene, 1.0 / 8);
   const auto measure = [&](double& p95) {
-    Raycaster raycaster(context(ContextKind::egl), h, field, gpu, scene);
+    Raycaster raycaster(context(ContextKind::egl), h, structure, scene);
     raycaster.draw();
     p95 = percentile(pixel_errors(raycaster.read(), reference), 0.95);
     return raycaster.count().samples;
@@ -411,12 +411,12 @@ TEST(Tolerance, IsReachedByEveryStructureWithWideAndNarrowCurves) {
 TEST(Tolerance, OfAWideCurveTakesFewerSamplesThanTheStepThatReachesIt) {
   const AmrHierarchy h(generate_mesh(Json::parse(R"({"field": "blobs_shell", "levels": 2})")));
   const EncodedField field = build(h, a_case("page_table", Filter::linear_page));
-  const GpuField gpu(field, context(ContextKind::egl));
+  const Structure structure(context(ContextKind::egl), field);
   Scene scene = scene_of(Integrator::tolerance, perspective({2.32, 1.87, 1.53}, Vec3d(0.5)), Sampling::adaptive, 64);
   scene.transfer_function = curves().front().light;
   const Picture reference = HierarchyReference(h, 0, field.definition).render(scene, 1.0 / 8);
   const auto measure = [&](double& p95) {
-    Raycaster raycaster(context(ContextKind::egl), h, field, gpu, scene);
+    Raycaster raycaster(context(ContextKind::egl), h, structure, scene);
     raycaster.draw();
     p95 = percentile(pixel_errors(raycaster.read(), reference), 0.95);
     return raycaster.count().samples;

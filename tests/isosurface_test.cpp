@@ -501,11 +501,11 @@ TEST(Needs, ScenesWithoutSurfacesHaveNoCodeForThem) {
   for_each_filter([&](const EncodingCase& c) {
     Context& gl = context(ContextKind::egl);
     const EncodedField field = build(h, c);
-    const GpuField gpu(field, gl);
+    const Structure structure(gl, field);
     Scene scene = rich_scene(Mode::dvr, Sampling::lattice, true);
-    EXPECT_FALSE(Raycaster(gl, h, field, gpu, scene).program().has_uniform("u_isovalues"));
+    EXPECT_FALSE(Raycaster(gl, h, structure, scene).program().has_uniform("u_isovalues"));
     scene.settings.mode = Mode::iso;
-    const Raycaster surfaces(gl, h, field, gpu, scene);
+    const Raycaster surfaces(gl, h, structure, scene);
     EXPECT_TRUE(surfaces.program().has_uniform("u_isovalues"));
     EXPECT_FALSE(surfaces.program().has_uniform("u_extinction_points")) << "nor surfaces code for the volume";
   });

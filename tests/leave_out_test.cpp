@@ -12,6 +12,7 @@
 #include "bench/measure/left_out_time.hpp"
 #include "bench/measure/runner.hpp"
 #include "bench/records/record.hpp"
+#include "renderers/bindings/scene_needs.hpp"
 #include "structures/common/build_tools.hpp"
 #include "structures/kd_tree/kd_tree_layout.h"
 #include "tests/pictures.hpp"
@@ -174,9 +175,9 @@ TEST(LeaveOut, APartThatIsNotNeededDoesNotChangeThePicture) {
       const EncodedField field = build(h, c, options);
       // on the context once a row: compiling shaders is what this test takes its time for
       if (c.filter != cases_of(row).front().filter) return render_on_cpu(h, field, scene, false);
-      const GpuField gpu(field, gl);  // throws where the shader and what is bound do not agree
-      Raycaster raycaster(gl, h, field, gpu, scene);
-      EXPECT_THAT(gpu.unused(raycaster.program()), testing::IsEmpty());
+      const Structure structure(gl, field);  // throws where the shader and what is bound do not agree
+      Raycaster raycaster(gl, h, structure, scene);
+      EXPECT_THAT(structure.gpu.unused(raycaster.program()), testing::IsEmpty());
       raycaster.draw();
       return raycaster.read();
     };
@@ -337,9 +338,9 @@ TEST(LeaveOut, EveryTextureOfAStructureIsReadByItsPicture) {
   for_each_filter([&](const EncodingCase& c) {
     for (const bool skip : {true, false}) {
       const EncodedField field = build(h, c, {.value_ranges = skip});
-      const GpuField gpu(field, gl);
-      const Raycaster raycaster(gl, h, field, gpu, volume(Sampling::lattice, skip));
-      EXPECT_THAT(gpu.unused(raycaster.program()), testing::IsEmpty()) << "skip " << skip;
+      const Structure structure(gl, field);
+      const Raycaster raycaster(gl, h, structure, volume(Sampling::lattice, skip));
+      EXPECT_THAT(structure.gpu.unused(raycaster.program()), testing::IsEmpty()) << "skip " << skip;
     }
   });
 }

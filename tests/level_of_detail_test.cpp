@@ -10,7 +10,7 @@
 #include "bench/records/record.hpp"
 #include "renderers/cpu/cpu_field.hpp"
 #include "renderers/gpu/program.hpp"
-#include "renderers/scene/scene_bindings.hpp"
+#include "renderers/bindings/scene_bindings.hpp"
 #include "shaders/shader_library.hpp"
 #include "structures/generators/random_mesh.hpp"
 #include "tests/pictures.hpp"

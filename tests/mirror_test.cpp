@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "renderers/consumers/box_consumer.hpp"
-#include "renderers/scene/scene_bindings.hpp"
+#include "renderers/bindings/scene_bindings.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {
@@ -194,8 +194,8 @@ TEST(Mirror, IsLeftOutAndRefusedByName) {
   scene.settings.mirror = Mirror{2, false};
   EXPECT_EQ(define(), 5);
   scene.settings.consumer = ConsumerKind::multipass;
-  const GpuField gpu(field, context(ContextKind::egl));
-  EXPECT_THROW(BoxConsumer(context(ContextKind::egl), h, field, gpu, scene), UnsupportedError);
+  const Structure structure(context(ContextKind::egl), field);
+  EXPECT_THROW(BoxConsumer(context(ContextKind::egl), h, structure, scene), UnsupportedError);
   scene.settings.point_light = PointLight{};
   try {
     bind_scene(h, field, scene);

@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "renderers/scene/scene_bindings.hpp"
+#include "renderers/bindings/scene_bindings.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {

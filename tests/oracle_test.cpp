@@ -18,18 +18,11 @@ Json oracle() {
   return Json::parse(file);
 }
 
-struct Built {
-  EncodedField field;
-  std::unique_ptr<GpuField> gpu;
-};
-
-Built build(const Encoding& encoding, const AmrHierarchy& mesh, Context& context) {
+Structure build(const Encoding& encoding, const AmrHierarchy& mesh, Context& context) {
   BuildRequest request;
   request.needs = {Filter::nearest, Filtering::manual, true};
   request.context = context.info();
-  Built built{encoding.build(mesh, request), nullptr};
-  built.gpu = std::make_unique<GpuField>(built.field, context);
-  return built;
+  return {context, encoding.build(mesh, request), request};
 }
 
 TEST(Oracle, PointSamplesAreThoseOfTheFileRoundedToFloat) {
@@ -44,8 +37,8 @@ TEST(Oracle, PointSamplesAreThoseOfTheFileRoundedToFloat) {
   }
   ASSERT_FALSE(points.empty());
   for (const Encoding* encoding : all_encodings()) {
-    const Built built = build(*encoding, mesh, *context);
-    const auto found = probe_on_gl(*context, mesh, built.field, *built.gpu, points);
+    const Structure structure = build(*encoding, mesh, *context);
+    const auto found = probe_on_gl(*context, mesh, structure, points);
     for (std::size_t i = 0; i < points.size(); ++i)
       EXPECT_EQ(found[i].value, static_cast<double>(static_cast<float>(values[i]))) << encoding->name() << ", point " << i;
   }
@@ -77,13 +70,13 @@ TEST(Oracle, LineIntegralsHoldThroughProjection) {
   const Json rays = oracle()["ortho_rays"]["rays"];
   ASSERT_FALSE(rays.empty());
   for (const Encoding* encoding : all_encodings()) {
-    const Built built = build(*encoding, mesh, *context);
+    const Structure structure = build(*encoding, mesh, *context);
     for (const Json& ray : rays) {
       const int axis = ray["axis"].get<std::string>()[0] - 'x';
       Vec3d through{0};
       for (int k = 0; k < 3; ++k)
         if (k != axis) through[k] = ray["through"][static_cast<std::size_t>(k)];
-      Raycaster raycaster(*context, mesh, built.field, *built.gpu, along(axis, through));
+      Raycaster raycaster(*context, mesh, structure, along(axis, through));
       raycaster.draw();
       const double expected = ray["sum_value_dx"];
       EXPECT_NEAR(raycaster.read().values[0], expected, 2e-6 * expected) << encoding->name() << ", " << ray.dump();

@@ -1,5 +1,5 @@
 // Fronts and fastest points of small sets whose answer can be seen.
-#include "bench/report/pareto.hpp"
+#include "bench/numbers/pareto.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

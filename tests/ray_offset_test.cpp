@@ -5,7 +5,7 @@
 #include <map>
 
 #include "renderers/consumers/box_consumer.hpp"
-#include "renderers/scene/scene_bindings.hpp"
+#include "renderers/bindings/scene_bindings.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {
@@ -106,16 +106,16 @@ TEST(RayOffset, IsTheSameBoxByBox) {
       Scene scene = offset_scene(Mode::dvr, sampling, 5);
       const Picture by_ray = draw(gl, h, field, scene);
       scene.settings.consumer = ConsumerKind::multipass;
-      const GpuField gpu(field, gl);
-      BoxConsumer consumer(gl, h, field, gpu, scene);
+      const Structure structure(gl, field);
+      BoxConsumer consumer(gl, h, structure, scene);
       consumer.draw();
       EXPECT_LE(difference(consumer.read(), by_ray), 2e-5);
       ++drawn;
     }
     Scene slices = offset_scene(Mode::dvr, Sampling::lattice, 5);
     slices.settings.consumer = ConsumerKind::slices;
-    const GpuField gpu(field, gl);
-    EXPECT_THROW(BoxConsumer(gl, h, field, gpu, slices), UnsupportedError);
+    const Structure structure(gl, field);
+    EXPECT_THROW(BoxConsumer(gl, h, structure, slices), UnsupportedError);
   });
   EXPECT_GT(drawn, 3);
 }

@@ -554,7 +554,7 @@ TEST(ReferenceFilter, RefinedCellsTakeTheMeanOfTheirLeavesAlsoWhereNoPatchStores
     double next = 0;
     add_patch(mesh, 2, {{2, 2, 2}, {4, 4, 4}}, [&](const Vec3d&) { return next++ == 0 ? kInf : 10.0; });
     const AmrHierarchy h(std::move(mesh));
-    const ReferenceField field(h, 0, {});
+    const ReferenceField field(h, 0);
     // six cells of 2 and 7/8 of a cell of 10
     EXPECT_NEAR(field.level_value(0, {0, 0, 0}), (6 * 2 + 0.875 * 10) / 6.875, 1e-14);
     EXPECT_NEAR(field.level_value(1, {1, 1, 1}), 10, 0);
@@ -578,16 +578,16 @@ TEST(ReferenceFilter, FillsAreFaceElseEdgeElseCornerNeighbours) {
   const auto distance = [](const Vec3i& c) { return std::abs(c.x - 1) + std::abs(c.y - 1) + std::abs(c.z - 1); };
   const Vec3i middle(1);
   const AmrHierarchy only_middle = field_without([&](const Vec3i& c) { return distance(c) == 0; });
-  EXPECT_DOUBLE_EQ(ReferenceField(only_middle, 0, {}).filled_value(0, middle), 111) << "mean of six";
+  EXPECT_DOUBLE_EQ(ReferenceField(only_middle, 0).filled_value(0, middle), 111) << "mean of six";
   const AmrHierarchy two = field_without([&](const Vec3i& c) { return distance(c) == 0 || c == Vec3i(0, 1, 1); });
-  EXPECT_DOUBLE_EQ(ReferenceField(two, 0, {}).filled_value(0, middle), (112 + 101 + 121 + 11 + 211) / 5.0) << "mean of five";
+  EXPECT_DOUBLE_EQ(ReferenceField(two, 0).filled_value(0, middle), (112 + 101 + 121 + 11 + 211) / 5.0) << "mean of five";
   const AmrHierarchy faces = field_without([&](const Vec3i& c) { return distance(c) <= 1 || c == Vec3i(0, 0, 1); });
-  EXPECT_DOUBLE_EQ(ReferenceField(faces, 0, {}).filled_value(0, middle), (12 * 111 - 100) / 11.0)
+  EXPECT_DOUBLE_EQ(ReferenceField(faces, 0).filled_value(0, middle), (12 * 111 - 100) / 11.0)
       << "mean of eleven edge neighbours";
   const AmrHierarchy edges = field_without([&](const Vec3i& c) { return distance(c) <= 2 || c == Vec3i(2); });
-  EXPECT_DOUBLE_EQ(ReferenceField(edges, 0, {}).filled_value(0, middle), (8 * 111 - 222) / 7.0)
+  EXPECT_DOUBLE_EQ(ReferenceField(edges, 0).filled_value(0, middle), (8 * 111 - 222) / 7.0)
       << "mean of seven corner neighbours";
-  const ReferenceField field(only_middle, 0, {});
+  const ReferenceField field(only_middle, 0);
   EXPECT_EQ(field.filled_value(0, {-1, 2, 1}), 120) << "outside: clamped at a face";
   EXPECT_EQ(field.filled_value(0, {3, 2, 3}), 222) << "... at an edge";
   EXPECT_EQ(field.filled_value(0, {-1, -1, 3}), 200) << "... and at a corner";
@@ -668,7 +668,7 @@ TEST(ReferenceRandom, LevelValuesAndFillsAreThoseOfTheBuilders) {
   // two texts for one definition: the encodings' and the reference's
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     const AmrHierarchy h(random_mesh(seed));
-    const ReferenceField field(h, 0, {});
+    const ReferenceField field(h, 0);
     for (int level = 0; level < h.level_count(); ++level) {
       const Vec3i middle = h.cells(level) / 2;
       const Box box = intersection(h.domain(level).grown(2), {middle - Vec3i(9), middle + Vec3i(9)});
@@ -708,8 +708,8 @@ TEST(ReferenceRandom, PiecesOfARayAreTheFieldAndLeaveNothingOut) {
     for (const auto& definition : all_definitions()) {
       if (definition.page_level >= h.level_count()) continue;
       const HierarchyReference reference(h, 0, definition);
-      const ReferenceField field(h, 0, definition);
-      ReferenceTracer tracer(field);
+      const auto filter = make_filter_reference(h, 0, definition);
+      ReferenceTracer tracer(*filter);
       std::mt19937_64 random(seed);
       for (int k = 0; k < 6; ++k) {
         const IndexRay ray = random_ray(h, random);

@@ -1,4 +1,4 @@
-#include "bench/measure/statistics.hpp"
+#include "bench/numbers/statistics.hpp"
 
 #include <gtest/gtest.h>
 

@@ -11,9 +11,9 @@
 #include <set>
 
 #include "renderers/consumers/box_consumer.hpp"
-#include "renderers/consumers/triangle_layer.hpp"
+#include "renderers/scene/triangle_layer.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
-#include "renderers/scene/scene_bindings.hpp"
+#include "renderers/bindings/scene_bindings.hpp"
 #include "renderers/scene/triangle_reader.hpp"
 #include "tests/pictures.hpp"
 
@@ -601,8 +601,8 @@ TEST(Triangles, AreLeftOutOfScenesWithoutThem) {
   const AssembledShader without = text(scene, "raycast.frag");
   EXPECT_EQ(without.text.find("AMRTEX_TRIANGLES"), std::string::npos);
   EXPECT_EQ(without.text.find("triangle_layer"), std::string::npos);
-  const GpuField gpu(field, gl);
-  const Raycaster plain(gl, h, field, gpu, scene);
+  const Structure structure(gl, field);
+  const Raycaster plain(gl, h, structure, scene);
   ShaderKey vertex;
   vertex.entry = "fullscreen.vert";
   EXPECT_EQ(plain.shader_hash(), hash_text(assemble_shader(vertex).hash + without.hash)) << "what is drawn is that text";
@@ -621,11 +621,11 @@ TEST(Triangles, AreRefusedByName) {
   const AmrHierarchy h = nested(waves).hierarchy();
   const EncodedField field = build(h, encoding_cases().front(), {.draw_boxes = true});
   Context& gl = context(ContextKind::egl);
-  const GpuField gpu(field, gl);
+  const Structure structure(gl, field);
   Scene boxes = triangle_scene(Mode::dvr, Sampling::lattice, {object(tetrahedron())}, oblique());
   boxes.settings.consumer = ConsumerKind::multipass;
   try {
-    BoxConsumer(gl, h, field, gpu, boxes);
+    BoxConsumer(gl, h, structure, boxes);
     ADD_FAILURE();
   } catch (const UnsupportedError& e) {
     EXPECT_THAT(e.what(), AllOf(HasSubstr("multipass"), HasSubstr("triangles")));

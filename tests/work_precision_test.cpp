@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "bench/records/record.hpp"
-#include "bench/report/pareto.hpp"
+#include "bench/numbers/pareto.hpp"
 #include "structures/mesh/error.hpp"
 #include "tests/table_files.hpp"
 

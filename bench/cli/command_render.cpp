@@ -4,6 +4,8 @@
 #include "bench/measure/error_split.hpp"
 #include "bench/measure/runner.hpp"
 #include "bench/settings/experiment.hpp"
+#include "renderers/bindings/scene_needs.hpp"
+#include "renderers/consumers/make_consumer.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
 #include "structures/mesh/quoted.hpp"
 
@@ -121,21 +123,21 @@ int run(const Arguments& a) {
     request.memory_limit = *scene.memory_limit;
   const Encoding& encoding = find_encoding(build.encoding);
   require_support(encoding, request.context);
-  const EncodedField field = encoding.build(mesh, request);
+  EncodedField field = encoding.build(mesh, request);
   if (a.reference) {
     write_picture(a, HierarchyReference(mesh, 0, field.definition).render(drawn, reference_step(a, scene)), scene, mesh);
     return 0;
   }
-  const GpuField gpu(field, *context);
-  const auto consumer = make_consumer(*context, mesh, field, gpu, drawn);
+  const Structure structure(*context, std::move(field), request);
+  const auto consumer = make_consumer(*context, mesh, structure, drawn);
   consumer->draw();
   const Picture picture = consumer->read();
   if (!a.output.empty()) write_picture(a, picture, scene, mesh);
   if (a.explain_error) {
     const double step = reference_step(a, scene);
-    const Picture reference = HierarchyReference(mesh, 0, field.definition).render(drawn, step);
+    const Picture reference = HierarchyReference(mesh, 0, structure.field.definition).render(drawn, step);
     const auto truth = analytic_field(scene.datasets[build.dataset]);
-    explain_error(a, {mesh, encoding, request, field, gpu, *context, drawn, reference, picture, step, truth.get()});
+    explain_error(a, {mesh, encoding, structure, *context, drawn, reference, picture, step, truth.get()});
   }
   return 0;
 }

@@ -57,11 +57,10 @@ std::vector<Sampled> sample(const Arguments& a) {
   const auto context = make_context(kind);
   request.context = context->info();
   require_support(encoding, request.context);
-  const EncodedField field = encoding.build(mesh, request);
-  const GpuField gpu(field, *context);
+  const Structure structure(*context, encoding.build(mesh, request), request);
 
   const EncodedField exact_field = build_exact(encoding, mesh, request);
-  const HierarchyReference reference(mesh, request.field, field.definition);
+  const HierarchyReference reference(mesh, request.field, structure.field.definition);
 
   std::vector<Sampled> samples;
   std::vector<FinestPosition> inside;
@@ -78,7 +77,7 @@ std::vector<Sampled> sample(const Arguments& a) {
     where.push_back(samples.size() - 1);
   }
   const auto doubles = probe_on_cpu(mesh, exact_field, Precision::double_precision, inside);
-  const auto gl = probe_on_gl(*context, mesh, field, gpu, inside);
+  const auto gl = probe_on_gl(*context, mesh, structure, inside);
   for (std::size_t i = 0; i < inside.size(); ++i) {
     samples[where[i]].encoding_double = doubles[i];
     samples[where[i]].encoding_gl = gl[i];

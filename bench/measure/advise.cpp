@@ -9,7 +9,7 @@
 #include <set>
 
 #include "bench/records/record.hpp"
-#include "bench/report/pareto.hpp"
+#include "bench/numbers/pareto.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {
@@ -254,7 +254,7 @@ class Search {
     std::vector<Candidate> all;
     for (const BuildPoint& build : builds)
       for (const RenderSettings& settings : candidate_settings(request_)) {
-        if (build.filter == Filter::nearest && settings.integrator == Integrator::tolerance) continue;  // validate_integrator
+        if (!interpolates(build.filter) && settings.integrator == Integrator::tolerance) continue;  // validate_integrator
         all.push_back({build, settings});
       }
     return all;
@@ -384,7 +384,7 @@ std::vector<BuildPoint> candidate_builds(const AdviceRequest& request) {
             build.parameters = complete_parameters(*encoding, parameters);
             build.filter = filter;
             build.storage = storage;
-            build.filtering = filter == Filter::nearest ? Filtering::manual : filtering;
+            build.filtering = interpolates(filter) ? filtering : Filtering::manual;
             add_once(builds, seen, build, build_key);
           }
       }

@@ -20,7 +20,7 @@ namespace amrtex {
 struct AdviceRequest {
   double tolerance = 1e-2;  ///< error that 95 % of the pixels that see something may not exceed, in (0, 1]
   std::int64_t memory_limit = std::numeric_limits<std::int64_t>::max();  ///< bytes of all textures and buffers of a structure
-  std::vector<Filter> filters = {Filter::linear_lod, Filter::linear_page, Filter::linear_vertex, Filter::basis};
+  std::vector<Filter> filters{interpolating_filters().begin(), interpolating_filters().end()};
   std::vector<Storage> storages = {Storage::r32f, Storage::r16, Storage::r8};
   std::vector<Filtering> filterings = {Filtering::hardware, Filtering::manual};
   /// What pictures are held against; absent: each against its own filter, and then filters do not compete.

@@ -4,7 +4,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "renderers/consumers/consumer.hpp"
+#include "renderers/consumers/scene_resources.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {
@@ -51,26 +51,27 @@ Scene changed_scene(Scene scene) {
   return scene;
 }
 
-ChangeTimes time_changes(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const GpuField& gpu,
-                         const Scene& scene, int times) {
+ChangeTimes time_changes(Context& context, const DomainGeometry& geometry, const Structure& structure, const Scene& scene,
+                         int times) {
   if (scene.settings.consumer != ConsumerKind::raycast)
     throw UnsupportedError("time of a change: only the consumer raycast is measured");
   if (scene.settings.prune) throw UnsupportedError("time of a change: with 'prune' what was hidden is not there to be shown");
   const Scene other = changed_scene(scene);
-  const SceneBindings before = bind_scene(hierarchy, field, scene), after = bind_scene(hierarchy, field, other);
+  const EncodedField& field = structure.field;
+  const SceneBindings before = bind_scene(geometry, field, scene), after = bind_scene(geometry, field, other);
   if (before.defines != after.defines) throw UnsupportedError("time of a change: the changed scene needs another shader");
   ShaderKey vertex;
   vertex.entry = "fullscreen.vert";
-  const SceneResources first(context, hierarchy, field, scene);
+  const SceneResources first(context, geometry, field, scene);
   Program program(context, assemble_shader(vertex), assemble_shader(first.shader_key("raycast.frag", false)));
-  first.bind(program, gpu);
+  first.bind(program, structure.gpu);
   ChangeTimes result;
   result.bytes = uploaded_bytes(before, after);
   for (int i = 0; i < times; ++i) {
     context.gl().Finish();
     const auto start = std::chrono::steady_clock::now();
-    const SceneResources resources(context, hierarchy, field, i % 2 == 0 ? other : scene);
-    resources.bind(program, gpu);
+    const SceneResources resources(context, geometry, field, i % 2 == 0 ? other : scene);
+    resources.bind(program, structure.gpu);
     context.gl().Finish();
     result.wall_ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
   }

@@ -5,8 +5,9 @@
 #include <vector>
 
 #include "renderers/context/context.hpp"
-#include "renderers/gpu/gpu_field.hpp"
+#include "renderers/gpu/structure.hpp"
 #include "renderers/scene/scene.hpp"
+#include "structures/mesh/domain_geometry.hpp"
 
 namespace amrtex {
 
@@ -22,7 +23,6 @@ struct ChangeTimes {
 /// Goes `times` times from the scene to the changed one or back: what decides which regions are hidden is made anew on the host,
 /// uploaded and bound, and GL has finished. No frame is drawn. Throws UnsupportedError where the changed scene needs another
 /// shader, or another structure because what was hidden was not built.
-ChangeTimes time_changes(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const GpuField& gpu,
-                         const Scene& scene, int times);
+ChangeTimes time_changes(Context& context, const DomainGeometry& geometry, const Structure& structure, const Scene& scene, int times);
 
 }  // namespace amrtex

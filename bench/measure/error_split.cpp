@@ -8,7 +8,9 @@
 #include <memory>
 
 #include "renderers/consumers/raycaster.hpp"
+#include "renderers/cpu/cpu_picture.hpp"
 #include "renderers/cpu/sampled_reference.hpp"
+#include "renderers/reference/hierarchy_reference.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {
@@ -60,56 +62,54 @@ Scene without_shortcuts(const Scene& scene) {
 Picture draw_samples(const SplitRequest& r, const Scene& scene, const EncodedField& field) {
   std::vector<std::unique_ptr<HierarchyReference>> references;
   for (int number = 0; number < field.field_count; ++number)
-    references.push_back(std::make_unique<HierarchyReference>(r.hierarchy, r.build.field_at(number), field.definition));
+    references.push_back(std::make_unique<HierarchyReference>(r.hierarchy, r.structure.request.field_at(number), field.definition));
   const FieldValues values = [&](const FinestPosition& p, int number) {
     return references[static_cast<std::size_t>(number)]->sample(p);
   };
   return render_sampled(r.hierarchy, field, scene, values);
 }
 
-Picture draw_on(const SplitRequest& r, const EncodedField& field, const GpuField& gpu, const Scene& scene) {
-  Raycaster raycaster(r.context, r.hierarchy, field, gpu, scene);
+Picture draw_on(const SplitRequest& r, const Structure& structure, const Scene& scene) {
+  Raycaster raycaster(r.context, r.hierarchy, structure, scene);
   raycaster.draw();
   return raycaster.read();
 }
 
-/// `field` where the shader filters it, else another build in which it does.
-class ManualField {
+/// The structure where the shader filters it, else another build in which it does.
+class ManualStructure {
  public:
-  explicit ManualField(const SplitRequest& r) {
-    if (r.field.filtering == Filtering::manual) return;
-    BuildRequest request = r.build;
+  explicit ManualStructure(const SplitRequest& r) : given_(r.structure) {
+    if (given_.field.filtering == Filtering::manual) return;
+    BuildRequest request = given_.request;
     request.needs.filtering = Filtering::manual;
-    built_ = std::make_unique<EncodedField>(r.encoding.build(r.hierarchy, request));
-    gpu_ = std::make_unique<GpuField>(*built_, r.context);
+    built_ = std::make_unique<Structure>(r.context, r.encoding.build(r.hierarchy, request), request);
   }
-  const EncodedField& field(const SplitRequest& r) const { return built_ ? *built_ : r.field; }
-  const GpuField& gpu(const SplitRequest& r) const { return gpu_ ? *gpu_ : r.gpu; }
+  const Structure& get() const { return built_ ? *built_ : given_; }
 
  private:
-  std::unique_ptr<EncodedField> built_;
-  std::unique_ptr<GpuField> gpu_;
+  const Structure& given_;
+  std::unique_ptr<Structure> built_;
 };
 
 BuildRequest exact_request(const SplitRequest& r) {
-  BuildRequest request = r.build;
+  BuildRequest request = r.structure.request;
   request.needs.filtering = Filtering::manual;
   request.memory_limit = std::numeric_limits<std::int64_t>::max();  // it stays on the CPU
   return request;
 }
 
-void add_context_pictures(const SplitRequest& r, const Scene& all, const ManualField& manual, Chain& chain) {
-  chain.add("driver", draw_on(r, manual.field(r), manual.gpu(r), all));
-  if (r.field.filtering == Filtering::hardware)
-    chain.add("filtering", draw_on(r, r.field, r.gpu, all));
+void add_context_pictures(const SplitRequest& r, const Scene& all, const Structure& manual, Chain& chain) {
+  chain.add("driver", draw_on(r, manual, all));
+  if (r.structure.field.filtering == Filtering::hardware)
+    chain.add("filtering", draw_on(r, r.structure, all));
   else
     chain.leave_out("filtering");
   if (r.scene.settings.early_end)
-    chain.add("early_end", draw_on(r, r.field, r.gpu, without_detail(r.scene)));
+    chain.add("early_end", draw_on(r, r.structure, without_detail(r.scene)));
   else
     chain.leave_out("early_end");
   if (r.scene.settings.prunes_levels())
-    chain.add("level_of_detail", draw_on(r, r.field, r.gpu, r.scene));
+    chain.add("level_of_detail", draw_on(r, r.structure, r.scene));
   else
     chain.leave_out("level_of_detail");
 }
@@ -133,23 +133,24 @@ ErrorSplit split_error(const SplitRequest& r) {
                                        consumer_name(r.scene.settings.consumer)));
   const Scene all = without_shortcuts(r.scene);
   Chain chain(r.reference);
-  const ManualField manual(r);
+  const ManualStructure filtered(r);
+  const Structure& manual = filtered.get();
   {
     const EncodedField exact = build_exact(r.encoding, r.hierarchy, exact_request(r));
     chain.add("step", draw_samples(r, all, exact));
     chain.add("encoding", render_on_cpu(r.hierarchy, exact, all, true));
-    if (exact.storage == manual.field(r).storage)
+    if (exact.storage == manual.field.storage)
       chain.leave_out("storage");  // one format alone: its error is the encoding's
     else
-      chain.add("storage", render_on_cpu(r.hierarchy, manual.field(r), all, true));
+      chain.add("storage", render_on_cpu(r.hierarchy, manual.field, all, true));
   }
-  chain.add("arithmetic", render_on_cpu(r.hierarchy, manual.field(r), all, false));
+  chain.add("arithmetic", render_on_cpu(r.hierarchy, manual.field, all, false));
   add_context_pictures(r, all, manual, chain);
   ErrorSplit split;
   split.sum_closes = chain.closes(r.picture, r.reference);
   split.causes = std::move(chain).causes();
   if (r.truth != nullptr && !r.scene.settings.draws_surfaces() && r.scene.more_fields.empty()) {
-    const HierarchyReference reference(r.hierarchy, r.build.field, r.field.definition);
+    const HierarchyReference reference(r.hierarchy, r.structure.request.field, r.structure.field.definition);
     split.filter = compare(r.reference, reference.render(r.scene, r.reference_step, *r.truth));
   }
   return split;

@@ -6,9 +6,9 @@
 #include <string_view>
 #include <vector>
 
-#include "bench/measure/image_error.hpp"
+#include "bench/numbers/image_error.hpp"
 #include "renderers/context/context.hpp"
-#include "renderers/gpu/gpu_field.hpp"
+#include "renderers/gpu/structure.hpp"
 #include "renderers/scene/scene.hpp"
 #include "structures/generators/synthetic.hpp"
 
@@ -18,9 +18,7 @@ namespace amrtex {
 struct SplitRequest {
   const AmrHierarchy& hierarchy;
   const Encoding& encoding;
-  const BuildRequest& build;  ///< as `field` was built
-  const EncodedField& field;  ///< on the context as `gpu`
-  const GpuField& gpu;
+  const Structure& structure;  ///< on the context
   Context& context;
   const Scene& scene;
   const Picture& reference;              ///< the double reference of the field's own filter

@@ -2,7 +2,7 @@
 
 #include <chrono>
 
-#include "bench/measure/statistics.hpp"
+#include "bench/numbers/statistics.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {

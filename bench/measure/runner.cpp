@@ -10,10 +10,13 @@
 #include "bench/measure/change_time.hpp"
 #include "bench/measure/environment.hpp"
 #include "bench/measure/error_split.hpp"
-#include "bench/measure/image_error.hpp"
+#include "bench/numbers/image_error.hpp"
 #include "bench/measure/left_out_time.hpp"
-#include "bench/measure/statistics.hpp"
+#include "bench/numbers/statistics.hpp"
 #include "bench/records/record.hpp"
+#include "renderers/bindings/scene_needs.hpp"
+#include "renderers/consumers/make_consumer.hpp"
+#include "renderers/gpu/structure.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
 #include "structures/generators/synthetic.hpp"
 #include "structures/readers/mesh_io.hpp"
@@ -39,9 +42,7 @@ class Stopwatch {
 
 /// A structure on the context, with what was measured on the way there.
 struct Built {
-  BuildRequest request;
-  EncodedField field;
-  std::unique_ptr<GpuField> gpu;
+  Structure structure;
   double build_seconds = 0;
   double upload_seconds = 0;
 };
@@ -147,7 +148,7 @@ class Runner {
     std::unique_ptr<Built> built;
     try {
       built = make(build, scene_of(experiment_, *renders.front()));
-      if (experiment_.explain_left_out) time_left_out(find_encoding(build.encoding), *mesh_, built->request, built->field);
+      if (experiment_.explain_left_out) time_left_out(find_encoding(build.encoding), *mesh_, built->structure.request, built->structure.field);
     } catch (const UsageError&) {
       throw;  // a bad parameter concerns the whole experiment
     } catch (const std::exception& error) {
@@ -178,13 +179,11 @@ class Runner {
     const Encoding& encoding = find_encoding(build.encoding);
     if (const Support support = encoding.supported(request.context); !support.ok)
       throw UnsupportedError(fmt::format("encoding {}: {}", build.encoding, support.reason));
-    auto built = std::make_unique<Built>();
-    built->request = request;
     const Stopwatch building;
-    built->field = encoding.build(*mesh_, request);
-    built->build_seconds = building.seconds();
+    EncodedField field = encoding.build(*mesh_, request);
+    const double build_seconds = building.seconds();
     const Stopwatch uploading;
-    built->gpu = std::make_unique<GpuField>(built->field, *context_);
+    auto built = std::make_unique<Built>(Built{Structure(*context_, std::move(field), request), build_seconds, 0});
     context_->gl().Finish();
     built->upload_seconds = uploading.seconds();
     return built;
@@ -193,7 +192,7 @@ class Runner {
   void measure(const BuildPoint& build, Built& built, const RenderPoint& render) {
     const Scene scene = scene_of(experiment_, render);
     const Stopwatch first;
-    const auto consumer = make_consumer(*context_, *mesh_, built.field, *built.gpu, scene);
+    const auto consumer = make_consumer(*context_, *mesh_, built.structure, scene);
     consumer->draw();
     const double first_frame_ms = first.seconds() * 1000;
     const Picture picture = consumer->read();
@@ -227,7 +226,7 @@ class Runner {
 
   void add_change(Json& record, const Built& built, const Scene& scene) {
     try {
-      const ChangeTimes change = time_changes(*context_, *mesh_, built.field, *built.gpu, scene, kChanges);
+      const ChangeTimes change = time_changes(*context_, *mesh_, built.structure, scene, kChanges);
       record["change"] = {{"wall_ms", timing_json(change.wall_ms)}, {"bytes", change.bytes}};
     } catch (const UnsupportedError& error) {
       record["change"] = nullptr;
@@ -247,7 +246,7 @@ class Runner {
     std::string hash;
     if (reference.common_filter) {
       FilterDefinition common{*reference.common_filter, 0, mesh_->finest_level()};
-      if (common.filter != Filter::linear_page) common.page_level = 0;
+      if (!common.has_pages()) common.page_level = 0;
       const Picture shared = cached_reference(*mesh_, common, judge, reference.step, cache, hash);
       record["error_common"] = error_json(compare(picture, shared), hash);
       record["error_common"]["p95"] = percentile(pixel_errors(picture, shared), 0.95);
@@ -255,7 +254,7 @@ class Runner {
       record["error_common"]["filter"] = filter_name(common.filter);
     }
     if (!reference.own) return true;
-    const Picture own = cached_reference(*mesh_, built.field.definition, judge, reference.step, cache, hash);
+    const Picture own = cached_reference(*mesh_, built.structure.field.definition, judge, reference.step, cache, hash);
     const ErrorMetrics error = compare(picture, own);
     record["error"] = error_json(error, hash);
     record["error"]["split"] = experiment_.explain_error ? explain(built, scene, own, picture) : Json();
@@ -279,16 +278,16 @@ class Runner {
   Json explain(const Built& built, const Scene& scene, const Picture& reference, const Picture& picture) {
     const auto truth = analytic_field(experiment_.datasets[loaded_]);
     const double step = experiment_.reference->step;
-    const Encoding& encoding = find_encoding(built.field.encoding);
+    const Encoding& encoding = find_encoding(built.structure.field.encoding);
     return split_json(split_error(
-        {*mesh_, encoding, built.request, built.field, *built.gpu, *context_, scene, reference, picture, step, truth.get()}));
+        {*mesh_, encoding, built.structure, *context_, scene, reference, picture, step, truth.get()}));
   }
 
   /// What the level of detail did: the picture against that of the same structure without it.
   Json pruning_error(const Built& built, Scene scene, const Picture& pruned) const {
     scene.settings.level_of_detail.reset();
     scene.settings.max_level.reset();
-    const auto whole = make_consumer(*context_, *mesh_, built.field, *built.gpu, scene);
+    const auto whole = make_consumer(*context_, *mesh_, built.structure, scene);
     whole->draw();
     const ErrorMetrics error = compare(pruned, whole->read());
     return {{"rmse", error.rmse}, {"max", error.max}};
@@ -361,7 +360,7 @@ class Runner {
     const std::string key = render_json(settings).dump();
     if (!baseline_) baseline_ = make_baseline(*first, scene_of(experiment_, settings));
     if (!baseline_consumer_ || key != baseline_key_) {
-      baseline_consumer_ = make_consumer(*context_, *mesh_, baseline_->field, *baseline_->gpu, scene_of(experiment_, settings));
+      baseline_consumer_ = make_consumer(*context_, *mesh_, baseline_->structure, scene_of(experiment_, settings));
       baseline_key_ = key;
     }
     return baseline_consumer_.get();
@@ -380,7 +379,7 @@ class Runner {
                          {"patches", patches},
                          {"field", mesh_->fields().front()}};
     record["encoding"] = build.encoding;
-    record["build_parameters"] = built != nullptr ? built->field.build_parameters : build.parameters;
+    record["build_parameters"] = built != nullptr ? built->structure.field.build_parameters : build.parameters;
     record["filter"] = filter_name(build.filter);
     record["storage"] = format_name(build.storage);
     record["filtering"] = filtering_name(build.filtering);
@@ -398,8 +397,8 @@ class Runner {
     record["build_seconds"] = built->build_seconds;
     record["upload_seconds"] = built->upload_seconds;
     record["left_out"] = left_out_json(built->field);
-    record["statistics"] = built->field.statistics;
-    record["storage_scale"] = {{"a", built->field.scale.offset}, {"b", built->field.scale.scale}};
+    record["statistics"] = built->structure.field.statistics;
+    record["storage_scale"] = {{"a", built->structure.field.scale.offset}, {"b", built->structure.field.scale.scale}};
   }
 
   void record_failure(const BuildPoint& build, const RenderPoint& render, const Failure& failure) {

@@ -7,8 +7,9 @@
 #include <optional>
 
 #include "bench/measure/runner.hpp"
+#include "renderers/bindings/scene_needs.hpp"
 #include "renderers/consumers/raycaster.hpp"
-#include "renderers/context/gpu_timer.hpp"
+#include "renderers/gpu/gpu_timer.hpp"
 #include "renderers/gpu/draw_target.hpp"
 
 namespace amrtex {
@@ -17,14 +18,14 @@ namespace {
 /// The scene's transfer function as a texture of evenly spaced entries, and the bare program.
 class BareMarch {
  public:
-  BareMarch(Context& context, const AmrHierarchy& mesh, const EncodedField& field, const Scene& scene)
+  BareMarch(Context& context, const DomainGeometry& geometry, const EncodedField& field, const Scene& scene)
       : context_(context),
-        bindings_(bind_scene(mesh, field, scene)),
+        bindings_(bind_scene(geometry, field, scene)),
         program_(context, assemble_shader(vertex_key()), assemble_shader(fragment_key())),
         target_(context, scene.settings.width, scene.settings.height),
         timer_(context) {
     upload_dense(*field.find("tex_dense"));
-    upload_transfer(scene.transfer_function, mesh);
+    upload_transfer(scene.transfer_function, geometry);
     program_.use();
     for (const UniformValue& u : bindings_.uniforms)
       if (u.name != "u_transfer_axis") program_.set_optional(u);
@@ -76,12 +77,12 @@ class BareMarch {
     filter(dense_.id());
   }
 
-  void upload_transfer(const TransferFunction& tf, const AmrHierarchy& mesh) {
+  void upload_transfer(const TransferFunction& tf, const DomainGeometry& geometry) {
     constexpr int kEntries = 256;
     const double lower = tf.extinction.front().value;
     const double upper = tf.extinction.back().value;
-    const Vec3d size = mesh.domain_upper() - mesh.domain_lower();
-    const double unit = mesh.spacing(mesh.finest_level()).x / std::max({size.x, size.y, size.z});
+    const Vec3d size = geometry.size();
+    const double unit = geometry.spacing.x / std::max({size.x, size.y, size.z});
     std::vector<glm::vec4> entries;
     for (int i = 0; i < kEntries; ++i) {
       const double v = lower + (upper - lower) * i / (kEntries - 1);
@@ -116,15 +117,13 @@ struct Bench {
     BuildRequest request;
     request.needs = scene_needs(scene, Filter::linear_page, Filtering::hardware);
     request.context = context->info();
-    field = find_encoding("uniform").build(*mesh, request);
-    gpu.emplace(field, *context);
-    raycaster.emplace(*context, *mesh, field, *gpu, scene);
-    bare.emplace(*context, *mesh, field, scene);
+    structure.emplace(*context, find_encoding("uniform").build(*mesh, request), request);
+    raycaster.emplace(*context, *mesh, *structure, scene);
+    bare.emplace(*context, *mesh, structure->field, scene);
   }
   std::optional<AmrHierarchy> mesh;
   std::unique_ptr<Context> context;
-  EncodedField field;
-  std::optional<GpuField> gpu;
+  std::optional<Structure> structure;
   std::optional<Raycaster> raycaster;
   std::optional<BareMarch> bare;
 };

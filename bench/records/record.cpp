@@ -13,7 +13,7 @@
 #include <fstream>
 #include <system_error>
 
-#include "bench/measure/statistics.hpp"
+#include "bench/numbers/statistics.hpp"
 #include "bench/settings/json_file.hpp"
 #include "structures/mesh/error.hpp"
 

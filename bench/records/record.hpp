@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "bench/measure/image_error.hpp"
+#include "bench/numbers/image_error.hpp"
 #include "structures/common/encoding.hpp"
 
 namespace amrtex {

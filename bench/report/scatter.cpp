@@ -10,7 +10,7 @@
 #include <optional>
 #include <string>
 
-#include "bench/measure/statistics.hpp"
+#include "bench/numbers/statistics.hpp"
 #include "bench/records/record.hpp"
 #include "bench/records/record_conditions.hpp"
 #include "bench/report/report.hpp"

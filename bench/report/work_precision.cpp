@@ -12,7 +12,7 @@
 #include <tuple>
 
 #include "bench/records/record.hpp"
-#include "bench/report/pareto.hpp"
+#include "bench/numbers/pareto.hpp"
 #include "bench/report/report.hpp"
 #include "bench/settings/json_file.hpp"
 

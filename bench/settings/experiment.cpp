@@ -281,7 +281,7 @@ class Parser {
           for (const Filtering filtering : axes.filterings) {
             build.filter = filter;
             build.storage = storage;
-            build.filtering = filter == Filter::nearest ? Filtering::manual : filtering;
+            build.filtering = interpolates(filter) ? filtering : Filtering::manual;
             builds.push_back(build);
           }
     }

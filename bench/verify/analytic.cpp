@@ -225,7 +225,7 @@ void constants(VerifyContext& v) {
     const AmrHierarchy& h = meshes.back();
     const auto at = probe_positions(h, 20);
     const EncodedField field = v.build(h, c);
-    const auto got = probe_on_gl(v.gl(), h, field, GpuField(field, v.gl()), at);
+    const auto got = probe_on_gl(v.gl(), h, Structure(v.gl(), field), at);
     return at_most(worst_ulps(h, got, at, static_cast<double>(static_cast<float>(value)), 0x1p-24), 2);
   });
 }
@@ -293,17 +293,12 @@ double largest_jump(const AmrHierarchy& h, const EncodedField& field) {
   return jump;
 }
 
-/// By its definition, on any mesh.
-bool continuous(const FilterDefinition& d) {
-  return d.filter == Filter::linear_vertex || d.filter == Filter::basis || (d.filter == Filter::linear_page && d.page_size == 0);
-}
-
 void continuity(VerifyContext& v) {
   const AmrHierarchy h = nested(waves).hierarchy();  // a corner where levels 0, 1 and 2 meet
   // range times at most 3 axes times two sides of a finest cell: Lipschitz times distance
   const double bound = 8 * value_range(h) * 0x1p-19;
   const auto is_continuous = [&](const EncodingCase& c) {
-    return continuous(v.build(h, c, {.storage = Storage::r64f}).definition);
+    return v.build(h, c, {.storage = Storage::r64f}).definition.continuous_everywhere();
   };
   v.for_each("10 continuous across faces, edges and corners", v.variants(), [&](const EncodingCase& c) -> Verdict {
     if (!is_continuous(c)) return NotAsked{"the filter jumps by its definition"};

@@ -7,7 +7,7 @@
 #include "bench/verify/pictures.hpp"
 #include "bench/verify/probing.hpp"
 #include "bench/verify/verify.hpp"
-#include "renderers/consumers/consumer.hpp"
+#include "renderers/consumers/make_consumer.hpp"
 #include "structures/generators/random_mesh.hpp"
 #include "structures/readers/amrex_plotfile/amrex_plotfile.hpp"
 #include "structures/readers/mesh_io.hpp"
@@ -50,7 +50,7 @@ void points_in_double(VerifyContext& v) {
 }
 
 Comparison on_gl(VerifyContext& v, const AmrHierarchy& h, const EncodedField& field, std::span<const FinestPosition> at) {
-  const auto got = probe_on_gl(v.gl(), h, field, GpuField(field, v.gl()), at);
+  const auto got = probe_on_gl(v.gl(), h, Structure(v.gl(), field), at);
   const bool hardware = field.filtering == Filtering::hardware;
   const bool nearest = field.definition.filter == Filter::nearest;
   Values expected = reference_values(h, field.definition, at);
@@ -352,8 +352,8 @@ Picture draw_slices(VerifyContext& v, const AmrHierarchy& h, const EncodedField&
   s.settings.consumer = ConsumerKind::slices;
   s.settings.slice_target = target;
   s.settings.step = static_cast<double>(h.cells(h.finest_level()).x) / slices;
-  const GpuField gpu(field, v.gl());
-  const auto consumer = make_consumer(v.gl(), h, field, gpu, s);
+  const Structure structure(v.gl(), field);
+  const auto consumer = make_consumer(v.gl(), h, structure, s);
   consumer->draw();
   return consumer->read();
 }

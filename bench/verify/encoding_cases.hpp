@@ -101,7 +101,7 @@ inline bool accepted(const EncodingCase& c, const BuildOptions& options = {}) {
 
 inline std::vector<Filtering> EncodingCase::filterings() const {
   std::vector<Filtering> all{Filtering::manual};
-  if (filter != Filter::nearest && accepted(*this, {.filtering = Filtering::hardware})) all.push_back(Filtering::hardware);
+  if (interpolates(filter) && accepted(*this, {.filtering = Filtering::hardware})) all.push_back(Filtering::hardware);
   return all;
 }
 

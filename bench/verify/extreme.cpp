@@ -69,7 +69,7 @@ void probe_mesh(VerifyContext& v, const std::string& name, const AmrHierarchy& h
   });
   v.for_each_filter(name + ", GL", [&](const EncodingCase& c) {
     const EncodedField field = v.build(h, c);
-    return same_values(h, field, at, probe_on_gl(v.gl(), h, field, GpuField(field, v.gl()), at), 1e-5);
+    return same_values(h, field, at, probe_on_gl(v.gl(), h, Structure(v.gl(), field), at), 1e-5);
   });
 }
 
@@ -251,7 +251,7 @@ void value_case(VerifyContext& v, const std::string& name, const Function& f, do
   const auto at = probe_positions(h, 20);
   v.for_each_filter("21 " + name + ", GL", [&](const EncodingCase& c) {
     const EncodedField field = v.build(h, c);
-    return same_values(h, field, at, probe_on_gl(v.gl(), h, field, GpuField(field, v.gl()), at), tolerance);
+    return same_values(h, field, at, probe_on_gl(v.gl(), h, Structure(v.gl(), field), at), tolerance);
   });
 }
 

@@ -6,6 +6,7 @@
 
 #include "bench/verify/meshes.hpp"
 #include "renderers/consumers/raycaster.hpp"
+#include "renderers/cpu/cpu_picture.hpp"
 
 namespace amrtex::verify {
 
@@ -73,8 +74,8 @@ inline double chord(const Scene& scene, int x, int y, const Vec3d& lower, const 
 
 inline Picture draw(Context& gl, const AmrHierarchy& h, const EncodedField& field, const Scene& scene,
                     WorkCounts* counts = nullptr) {
-  const GpuField gpu(field, gl);
-  Raycaster raycaster(gl, h, field, gpu, scene);
+  const Structure structure(gl, field);
+  Raycaster raycaster(gl, h, structure, scene);
   raycaster.draw();
   Picture picture = raycaster.read();
   if (counts != nullptr) *counts = raycaster.count();

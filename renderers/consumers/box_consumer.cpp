@@ -62,22 +62,21 @@ DrawTarget make_target(Context& context, const RenderSettings& s, bool counting)
 
 }  // namespace
 
-BoxConsumer::BoxConsumer(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const GpuField& gpu,
-                         const Scene& scene)
+BoxConsumer::BoxConsumer(Context& context, const DomainGeometry& geometry, const Structure& structure, const Scene& scene)
     : context_(&context),
-      tree_(&field.draw_tree),
-      gpu_(&gpu),
-      scene_(require_drawable(scene, field)),
-      resources_(context, hierarchy, field, scene),
-      camera_(finest_camera(hierarchy, scene)),
+      tree_(&structure.field.draw_tree),
+      gpu_(&structure.gpu),
+      scene_(require_drawable(scene, structure.field)),
+      resources_(context, geometry, structure.field, scene),
+      camera_(finest_camera(geometry, scene)),
       polygons_(camera_, scene.settings.width, scene.settings.height),
+      level_widths_(geometry.level_widths),
       program_(make_program(false)),
       target_(make_target(context, scene.settings, false)),
       timer_(context),
       vertex_array_(make_vertex_array(context)),
       vertices_(make_buffer(context)) {
   const GladGLContext& gl = context.gl();
-  for (int l = 0; l < hierarchy.level_count(); ++l) level_widths_.push_back(hierarchy.cell_width(l));
   // half a step off the middle, where faces of cells are: planes along an axis keep off them
   const Vec3d middle = (camera_.lower + camera_.upper) * 0.5;
   first_slice_ = glm::dot((middle - camera_.eye) / camera_.cells_per_unit, camera_.forward) + 0.5 * scene.settings.step;

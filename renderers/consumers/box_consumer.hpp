@@ -11,18 +11,19 @@
 #include <span>
 
 #include "renderers/consumers/consumer.hpp"
+#include "renderers/consumers/scene_resources.hpp"
 #include "renderers/consumers/screen_polygons.hpp"
-#include "renderers/context/gpu_timer.hpp"
 #include "renderers/gpu/draw_target.hpp"
+#include "renderers/gpu/gpu_timer.hpp"
+#include "renderers/gpu/structure.hpp"
 
 namespace amrtex {
 
 class BoxConsumer final : public Consumer {
  public:
   /// Throws UnsupportedError for surfaces, early_end, eight bits of anything but colour, an encoding without boxes, and a context
-  /// whose vertex shaders cannot read the field's buffers.
-  BoxConsumer(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const GpuField& gpu,
-              const Scene& scene);
+  /// whose vertex shaders cannot read the field's buffers. The structure and the context must outlive the object.
+  BoxConsumer(Context& context, const DomainGeometry& geometry, const Structure& structure, const Scene& scene);
 
   /// The host's part is done anew each frame, as if the view had moved: order, polygons, upload.
   FrameTime draw() override;

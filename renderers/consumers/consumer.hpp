@@ -1,14 +1,10 @@
-// What draws a built field: one interface for the raycaster and for those that draw box by box.
+// What draws a structure: one interface for the raycaster and for those that draw box by box.
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <string>
-#include <vector>
 
-#include "renderers/gpu/gpu_field.hpp"
 #include "renderers/scene/picture.hpp"
-#include "renderers/scene/scene_bindings.hpp"
 
 namespace amrtex {
 
@@ -40,31 +36,6 @@ class Consumer {
   virtual bool transfer_exact() const = 0;
   /// That finding where rays meet the scene's triangles took, before the first draw; 0 where it has none.
   virtual double triangle_seconds() const { return 0; }
-};
-
-/// The scene's consumer. Throws UnsupportedError naming consumer and reason where it cannot draw the scene or the field. The
-/// field, its GPU copy and the context must outlive it.
-std::unique_ptr<Consumer> make_consumer(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field,
-                                        const GpuField& gpu, const Scene& scene);
-
-/// What the scene adds to the field's part of a program: defines, uniforms, tables on the GPU.
-class SceneResources {
- public:
-  SceneResources(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene);
-
-  /// Entry file with the defines of field and scene.
-  ShaderKey shader_key(const std::string& entry, bool counting) const;
-  /// Uses the program, sets what the scene tells it and binds the field.
-  void bind(Program& program, const GpuField& gpu) const;
-  /// Storage buffers of field and scene.
-  int buffer_count() const;
-  bool transfer_exact() const { return bindings_.transfer_exact; }
-  double triangle_seconds() const { return bindings_.triangle_seconds; }
-
- private:
-  const EncodedField* field_;
-  SceneBindings bindings_;
-  std::vector<GlBuffer> buffers_;
 };
 
 }  // namespace amrtex

@@ -1,6 +1,6 @@
 #include "renderers/consumers/probe.hpp"
 
-#include "renderers/scene/scene_bindings.hpp"
+#include "renderers/bindings/scene_bindings.hpp"
 
 namespace amrtex {
 namespace {
@@ -14,8 +14,9 @@ GlBuffer upload(Context& context, const std::vector<T>& values) {
 
 }  // namespace
 
-std::vector<ProbeResult> probe_on_gl(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field,
-                                     const GpuField& gpu, std::span<const FinestPosition> points, int number) {
+std::vector<ProbeResult> probe_on_gl(Context& context, const DomainGeometry& geometry, const Structure& structure,
+                                     std::span<const FinestPosition> points, int number) {
+  const EncodedField& field = structure.field;
   field.scale_of(number);  // refuses a number that the shader could not index
   if (points.empty()) return {};
   std::vector<glm::ivec4> cells;
@@ -33,12 +34,12 @@ std::vector<ProbeResult> probe_on_gl(Context& context, const AmrHierarchy& hiera
   std::vector<glm::vec4> values(points.size());
   const GlBuffer value_buffer = upload(context, values);
   program.use();
-  for (const UniformValue& u : field_uniforms(hierarchy, field)) program.set_optional(u);
+  for (const UniformValue& u : field_uniforms(geometry, field)) program.set_optional(u);
   program.set("u_probe_count", static_cast<int>(points.size()));
   program.bind_buffer("probe_cells_block", cell_buffer.id());
   program.bind_buffer("probe_fractions_block", fraction_buffer.id());
   program.bind_buffer("probe_values_block", value_buffer.id());
-  gpu.bind(program);
+  structure.gpu.bind(program);
   context.gl().DispatchCompute(static_cast<GLuint>((points.size() + 63) / 64), 1, 1);
   context.gl().MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
   context.gl().GetNamedBufferSubData(value_buffer.id(), 0, static_cast<GLsizeiptr>(values.size() * sizeof(glm::vec4)),
@@ -49,12 +50,12 @@ std::vector<ProbeResult> probe_on_gl(Context& context, const AmrHierarchy& hiera
   return results;
 }
 
-std::vector<ProbeResult> probe_on_cpu(const AmrHierarchy& hierarchy, const EncodedField& field, Precision precision,
+std::vector<ProbeResult> probe_on_cpu(const DomainGeometry& geometry, const EncodedField& field, Precision precision,
                                       std::span<const FinestPosition> points, int number) {
   const auto cpu = make_cpu_field(field.encoding, precision);
   std::vector<const HostTexture*> textures;
   for (const HostTexture& t : field.textures) textures.push_back(&t);
-  cpu->set(field.shader.defines, field_uniforms(hierarchy, field), textures);
+  cpu->set(field.shader.defines, field_uniforms(geometry, field), textures);
   std::vector<ProbeResult> results;
   for (const FinestPosition& p : points) results.push_back(cpu->sample(p.cell, p.fraction, number));
   return results;

@@ -5,16 +5,17 @@
 #include <vector>
 
 #include "renderers/cpu/cpu_field.hpp"
-#include "renderers/gpu/gpu_field.hpp"
-#include "renderers/reference/hierarchy_reference.hpp"
+#include "renderers/gpu/structure.hpp"
+#include "structures/mesh/domain_geometry.hpp"
+#include "structures/mesh/finest_position.hpp"
 
 namespace amrtex {
 
 /// The shader's positions: the fraction as float, so that GL and CPU see the same point. `number`
 /// of the fields that the structure holds; throw UsageError where there are not so many.
-std::vector<ProbeResult> probe_on_gl(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field,
-                                     const GpuField& gpu, std::span<const FinestPosition> points, int number = 0);
-std::vector<ProbeResult> probe_on_cpu(const AmrHierarchy& hierarchy, const EncodedField& field, Precision precision,
+std::vector<ProbeResult> probe_on_gl(Context& context, const DomainGeometry& geometry, const Structure& structure,
+                                     std::span<const FinestPosition> points, int number = 0);
+std::vector<ProbeResult> probe_on_cpu(const DomainGeometry& geometry, const EncodedField& field, Precision precision,
                                       std::span<const FinestPosition> points, int number = 0);
 
 }  // namespace amrtex

@@ -1,17 +1,14 @@
 #include "renderers/consumers/raycaster.hpp"
 
-#include <tbb/parallel_for.h>
-
 #include <chrono>
 
 namespace amrtex {
 
-Raycaster::Raycaster(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const GpuField& gpu,
-                     const Scene& scene)
+Raycaster::Raycaster(Context& context, const DomainGeometry& geometry, const Structure& structure, const Scene& scene)
     : context_(&context),
-      gpu_(&gpu),
+      gpu_(&structure.gpu),
       scene_(scene),
-      resources_(context, hierarchy, field, scene),
+      resources_(context, geometry, structure.field, scene),
       program_(make_program(false)),
       target_(context, scene.settings.width, scene.settings.height),
       timer_(context) {}
@@ -54,30 +51,6 @@ WorkCounts Raycaster::count() {
   }
   context_->check("counting samples");
   return counts;
-}
-
-Picture render_on_cpu(const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene, bool double_precision) {
-  const auto cpu = make_cpu_field(field.encoding, double_precision ? Precision::double_precision : Precision::single_precision);
-  return trace_on_cpu(*cpu, hierarchy, field, scene);
-}
-
-Picture trace_on_cpu(CpuField& cpu, const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene) {
-  const SceneBindings bindings = bind_scene(hierarchy, field, scene);
-  auto defines = bindings.defines;
-  defines.insert(defines.end(), field.shader.defines.begin(), field.shader.defines.end());
-  std::vector<const HostTexture*> textures;
-  for (const HostTexture& t : field.textures) textures.push_back(&t);
-  for (const HostTexture& t : bindings.buffers) textures.push_back(&t);
-  cpu.set(defines, bindings.uniforms, textures);
-  const RenderSettings& s = scene.settings;
-  Picture picture(s.width, s.height, s.picture_channels());
-  tbb::parallel_for(0, s.height, [&](int y) {
-    for (int x = 0; x < s.width; ++x) {
-      const auto value = cpu.trace(x + 0.5, s.height - y - 0.5);
-      std::copy_n(value.begin(), picture.channels, picture.pixel(x, y));
-    }
-  });
-  return picture;
 }
 
 }  // namespace amrtex

@@ -2,16 +2,17 @@
 #pragma once
 
 #include "renderers/consumers/consumer.hpp"
-#include "renderers/context/gpu_timer.hpp"
-#include "renderers/cpu/cpu_field.hpp"
+#include "renderers/consumers/scene_resources.hpp"
 #include "renderers/gpu/draw_target.hpp"
+#include "renderers/gpu/gpu_timer.hpp"
+#include "renderers/gpu/structure.hpp"
 
 namespace amrtex {
 
 class Raycaster final : public Consumer {
  public:
-  /// The field, its GPU copy and the context must outlive this object.
-  Raycaster(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const GpuField& gpu, const Scene& scene);
+  /// The structure and the context must outlive this object.
+  Raycaster(Context& context, const DomainGeometry& geometry, const Structure& structure, const Scene& scene);
 
   FrameTime draw() override;
   /// The last picture drawn: 4 channels for dvr, else 1.
@@ -33,10 +34,5 @@ class Raycaster final : public Consumer {
   DrawTarget target_;
   GpuTimer timer_;
 };
-
-/// The same text on the CPU, all cores.
-Picture render_on_cpu(const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene, bool double_precision);
-/// The same with a CPU build of one's own.
-Picture trace_on_cpu(CpuField& cpu, const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene);
 
 }  // namespace amrtex

@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "renderers/scene/scene_bindings.hpp"
+#include "renderers/bindings/finest_camera.hpp"
 
 namespace amrtex {
 

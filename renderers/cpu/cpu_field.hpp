@@ -4,7 +4,7 @@
 #include <array>
 #include <memory>
 
-#include "renderers/gpu/uniforms.hpp"
+#include "renderers/bindings/uniforms.hpp"
 #include "renderers/scene/picture.hpp"
 #include "renderers/scene/scene.hpp"
 #include "structures/common/encoding.hpp"

@@ -8,7 +8,8 @@
 #include <string_view>
 
 #include "renderers/cpu/cpu_field.hpp"
-#include "renderers/reference/hierarchy_reference.hpp"
+#include "structures/mesh/domain_geometry.hpp"
+#include "structures/mesh/finest_position.hpp"
 
 namespace amrtex {
 
@@ -21,6 +22,6 @@ std::unique_ptr<CpuField> make_sampler(std::string_view encoding, const FieldVal
 
 /// The scene drawn from `values` where `field` would be sampled, on all cores. No region is skipped, so
 /// that no value range of the encoding counts; skipping changes no picture.
-Picture render_sampled(const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene, const FieldValues& values);
+Picture render_sampled(const DomainGeometry& geometry, const EncodedField& field, const Scene& scene, const FieldValues& values);
 
 }  // namespace amrtex

@@ -9,7 +9,7 @@
 
 #include "renderers/gpu/gl_objects.hpp"
 #include "renderers/gpu/shader_assembler.hpp"
-#include "renderers/gpu/uniforms.hpp"
+#include "renderers/bindings/uniforms.hpp"
 
 namespace amrtex {
 

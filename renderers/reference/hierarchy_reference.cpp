@@ -11,15 +11,15 @@
 #include <map>
 #include <mutex>
 
-#include "renderers/consumers/triangle_layer.hpp"
+#include "renderers/reference/filter_reference.hpp"
 #include "renderers/reference/reference_clip.hpp"
-#include "renderers/reference/reference_field.hpp"
 #include "renderers/reference/reference_fields.hpp"
 #include "renderers/reference/reference_light.hpp"
 #include "renderers/reference/reference_parts.hpp"
 #include "renderers/reference/reference_point.hpp"
 #include "renderers/reference/reference_surface.hpp"
 #include "renderers/reference/reference_tracer.hpp"
+#include "renderers/scene/triangle_layer.hpp"
 
 namespace amrtex {
 namespace {
@@ -40,10 +40,6 @@ struct Drawing {
   std::optional<Mirror> mirror;
 };
 
-Vec3d to_index(const AmrHierarchy& h, const Vec3d& p_world) {
-  return (p_world - h.domain_lower()) * Vec3d(h.cells(h.finest_level())) / (h.domain_upper() - h.domain_lower());
-}
-
 Drawing make_drawing(const AmrHierarchy& h, const Scene& scene, double step, const TransferTable* table,
                      const AnalyticField* truth) {
   const Vec3d domain(h.cells(h.finest_level()));
@@ -62,8 +58,8 @@ Drawing make_drawing(const AmrHierarchy& h, const Scene& scene, double step, con
   d.mirror = scene.settings.mirror;
   for (const ClipPlane& plane : scene.settings.clip_planes) d.planes.push_back(in_finest_cells(h, plane));
   if (scene.region) {
-    d.lower = glm::max(d.lower, to_index(h, (*scene.region)[0]));
-    d.upper = glm::min(d.upper, to_index(h, (*scene.region)[1]));
+    d.lower = glm::max(d.lower, to_finest_index(h, (*scene.region)[0]));
+    d.upper = glm::min(d.upper, to_finest_index(h, (*scene.region)[1]));
   }
   return d;
 }
@@ -157,7 +153,7 @@ void draw_light(ReferenceTracer& tracer, const std::vector<RayPart>& parts, cons
 
 /// A further field of a volume.
 struct OtherField {
-  const ReferenceField* field;
+  const FilterReference* filter;
   TransferTable table;
 };
 
@@ -278,49 +274,45 @@ double extinction_scale(const AmrHierarchy& h, const TransferFunction& tf) {
 
 }  // namespace
 
-std::optional<FinestPosition> finest_position(const AmrHierarchy& hierarchy, const Vec3d& p_world) {
-  // asked in the world: a point at the domain's upper end may be rounded past it in cells
-  for (int a = 0; a < 3; ++a)
-    if (!(p_world[a] >= hierarchy.domain_lower()[a] && p_world[a] <= hierarchy.domain_upper()[a])) return std::nullopt;
-  return position_at(hierarchy, glm::min(to_index(hierarchy, p_world), Vec3d(hierarchy.cells(hierarchy.finest_level()))));
-}
-
 struct HierarchyReference::Data {
-  ReferenceField field;
-  std::mutex mutex;
-  std::map<int, ReferenceField> others;  // made when a scene first asks for them
-  tbb::enumerable_thread_specific<VertexCache> vertices;
+  Data(const AmrHierarchy& hierarchy, int field, const FilterDefinition& definition)
+      : filter(make_filter_reference(hierarchy, field, definition)), points([this] { return ReferencePoint(*filter); }) {}
 
-  const ReferenceField* color_field(const Scene& scene);
-  const ReferenceField* other_field(const std::string& name);
+  std::unique_ptr<FilterReference> filter;
+  tbb::enumerable_thread_specific<ReferencePoint> points;
+  std::mutex mutex;
+  std::map<int, std::unique_ptr<FilterReference>> others;  // over further fields, made when a scene first asks for them
+
+  const FilterReference* color_filter(const Scene& scene);
+  const FilterReference* other_filter(const std::string& field);
 };
 
-/// The field that colours the scene's surfaces; null where the isovalue does.
-const ReferenceField* HierarchyReference::Data::color_field(const Scene& scene) {
+/// Over the field that colours the scene's surfaces; null where the isovalue does.
+const FilterReference* HierarchyReference::Data::color_filter(const Scene& scene) {
   const std::string& name = scene.settings.isosurfaces.color_field;
   if (!scene.settings.draws_surfaces() || name.empty()) return nullptr;
-  return other_field(name);
+  return other_filter(name);
 }
 
-const ReferenceField* HierarchyReference::Data::other_field(const std::string& name) {
-  const int index = field.hierarchy().field_index(name);
+const FilterReference* HierarchyReference::Data::other_filter(const std::string& field) {
+  const AmrHierarchy& hierarchy = filter->hierarchy();
+  const int index = hierarchy.field_index(field);
   const std::lock_guard lock(mutex);
+  std::unique_ptr<FilterReference>& other = others[index];
   // while it waits for its own tasks this thread must not take up another picture, which would lock again
-  return tbb::this_task_arena::isolate(
-      [&] { return &others.try_emplace(index, field.hierarchy(), index, field.definition()).first->second; });
+  if (!other)
+    tbb::this_task_arena::isolate([&] { other = make_filter_reference(hierarchy, index, filter->definition()); });
+  return other.get();
 }
 
 HierarchyReference::HierarchyReference(const AmrHierarchy& hierarchy, int field, FilterDefinition definition)
-    : data_(new Data{ReferenceField(hierarchy, field, definition), {}, {}, {}}) {}
+    : data_(new Data(hierarchy, field, definition)) {}
 HierarchyReference::~HierarchyReference() = default;
 
-std::optional<double> HierarchyReference::sample(const FinestPosition& p) const {
-  const bool vertices = data_->field.definition().filter == Filter::linear_vertex;  // the one filter that keeps any
-  return value_at(data_->field, p, vertices ? &data_->vertices.local() : nullptr);
-}
+std::optional<double> HierarchyReference::sample(const FinestPosition& p) const { return data_->points.local().value(p); }
 
 std::optional<double> HierarchyReference::sample(const Vec3d& p_world) const {
-  const auto p = finest_position(data_->field.hierarchy(), p_world);
+  const auto p = finest_position(data_->filter->hierarchy(), p_world);
   return p ? sample(*p) : std::nullopt;
 }
 
@@ -336,13 +328,13 @@ Picture HierarchyReference::render(const Scene& scene, double step, const Analyt
 
 Picture HierarchyReference::draw(const Scene& scene, double step, const AnalyticField* truth) const {
   check(scene, step);
-  const AmrHierarchy& h = data_->field.hierarchy();
-  const ReferenceField* color_field = data_->color_field(scene);
+  const AmrHierarchy& h = data_->filter->hierarchy();
+  const FilterReference* color_filter = data_->color_filter(scene);
   std::optional<TransferTable> table;
   if (scene.settings.draws_volume()) table.emplace(scene.transfer_function, extinction_scale(h, scene.transfer_function));
   const Drawing drawing = make_drawing(h, scene, step, table ? &*table : nullptr, truth);
   std::optional<SurfaceScene> surfaces;
-  if (scene.settings.draws_surfaces()) surfaces.emplace(scene, data_->field, color_field, drawing.table, drawing.part);
+  if (scene.settings.draws_surfaces()) surfaces.emplace(scene, *data_->filter, color_filter, drawing.table, drawing.part);
   if (surfaces) {
     surfaces->lower = drawing.lower;
     surfaces->upper = drawing.upper;
@@ -350,17 +342,17 @@ Picture HierarchyReference::draw(const Scene& scene, double step, const Analytic
   }
   std::optional<LampScene> lamp;
   if (scene.settings.point_light)
-    lamp.emplace(scene, data_->field, extinction_scale(h, scene.transfer_function), drawing.lower, drawing.upper, drawing.part);
+    lamp.emplace(scene, *data_->filter, extinction_scale(h, scene.transfer_function), drawing.lower, drawing.upper, drawing.part);
   std::vector<OtherField> others;
   for (const FieldTransfer& f : scene.more_fields)
-    others.push_back({data_->other_field(f.field), TransferTable(f.transfer_function, extinction_scale(h, f.transfer_function))});
+    others.push_back({data_->other_filter(f.field), TransferTable(f.transfer_function, extinction_scale(h, f.transfer_function))});
   std::optional<TriangleLayer> triangles;
   if (!scene.settings.triangles.empty()) triangles = trace_triangles(scene);
   Picture picture(scene.settings.width, scene.settings.height, scene.settings.picture_channels());
   const int columns = ceil_div(picture.width, kTile);
   tbb::enumerable_thread_specific<Worker> workers([&] {
-    Worker worker{ReferenceTracer(data_->field), std::nullopt, std::nullopt, {}};
-    for (const OtherField& other : others) worker.others.emplace_back(*other.field);
+    Worker worker{ReferenceTracer(*data_->filter), std::nullopt, std::nullopt, {}};
+    for (const OtherField& other : others) worker.others.emplace_back(*other.filter);
     if (surfaces) worker.painter.emplace(*surfaces);
     if (lamp) worker.lamp.emplace(*lamp);
     return worker;

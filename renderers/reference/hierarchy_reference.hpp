@@ -10,18 +10,10 @@
 #include "renderers/scene/scene.hpp"
 #include "structures/generators/synthetic.hpp"
 #include "structures/mesh/amr_hierarchy.hpp"
+#include "structures/mesh/filter.hpp"
+#include "structures/mesh/finest_position.hpp"
 
 namespace amrtex {
-
-/// A position as everywhere in the contract: a cell of the finest level and a fraction in [0, 1).
-struct FinestPosition {
-  Vec3i cell;
-  Vec3d fraction;
-};
-
-/// World -> finest position; a point on a face belongs to the upper cell, the domain's
-/// last face to its last cell. nullopt outside the domain.
-std::optional<FinestPosition> finest_position(const AmrHierarchy& hierarchy, const Vec3d& p_world);
 
 /// Safe to use from several threads.
 class HierarchyReference {

@@ -1,57 +1,22 @@
 #include "renderers/reference/reference_field.hpp"
 
-#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
+
+#include "renderers/reference/exact_mean.hpp"
 
 namespace amrtex {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-Vec3i corner_offset(int k) { return {k & 1, (k >> 1) & 1, k >> 2}; }
-
-/// Mean relative to its first value, so that a constant is reproduced to the bit.
-class ExactMean {
- public:
-  void add(double value, double weight = 1) {
-    if (weight_ == 0) first_ = value;
-    sum_ += (value - first_) * weight;
-    weight_ += weight;
-  }
-  double weight() const { return weight_; }
-  double value() const { return weight_ > 0 ? first_ + sum_ / weight_ : kNone; }
-
- private:
-  double first_ = 0;
-  double sum_ = 0;
-  double weight_ = 0;
-};
-
 }  // namespace
 
-Trilinear Trilinear::through(const std::array<double, 8>& corners) {
-  Trilinear f{corners};
-  for (int bit = 1; bit < 8; bit *= 2)
-    for (int k = 0; k < 8; ++k)
-      if ((k & bit) != 0) f.coefficients[static_cast<std::size_t>(k)] -= f.coefficients[static_cast<std::size_t>(k ^ bit)];
-  return f;
-}
-
-double Trilinear::operator()(const Vec3d& q) const {
-  const auto& a = coefficients;
-  return a[0] + a[1] * q.x + (a[2] + a[3] * q.x) * q.y + (a[4] + a[5] * q.x + (a[6] + a[7] * q.x) * q.y) * q.z;
-}
-
-ReferenceField::ReferenceField(const AmrHierarchy& hierarchy, int field, const FilterDefinition& definition)
-    : hierarchy_(hierarchy), definition_(definition) {
+ReferenceField::ReferenceField(const AmrHierarchy& hierarchy, int field) : hierarchy_(hierarchy) {
   const int n = hierarchy.level_count();
-  if (definition.page_size < 0) throw Error(fmt::format("page_size {}: must not be negative", definition.page_size));
-  if (definition.filter == Filter::linear_page && definition.page_size == 0 &&
-      (definition.page_level < 0 || definition.page_level >= n))
-    throw Error(fmt::format("page level {}: data set {} has levels 0 to {}", definition.page_level, hierarchy.name(), n - 1));
   levels_.resize(static_cast<std::size_t>(n));
   std::atomic<bool> missing = hierarchy.has_holes();
   for (int l = n - 1; l >= 0; --l) {
@@ -68,7 +33,6 @@ ReferenceField::ReferenceField(const AmrHierarchy& hierarchy, int field, const F
       restrict_patch(l, view);
     });
     find_unstored(l);
-    if (definition.filter == Filter::linear_page && definition.page_size > 0) split_pages(l);
   }
   has_missing_ = missing;
 }
@@ -219,84 +183,6 @@ ReferenceField::BasisCell ReferenceField::basis_cell(int level, const Vec3i& low
   // a finer leaf reaches half of its own width past its box: less than to the outer faces of these cells
   basis.finer = hierarchy_.refined_within(level, intersection({lower, lower + Vec3i(2)}, hierarchy_.domain(level)));
   return basis;
-}
-
-double ReferenceField::vertex_value(const Vec3i& vertex, VertexCache* cache) const {
-  if (cache == nullptr) return compute_vertex(vertex, nullptr);
-  const auto& entry = cache->at(vertex);
-  if (entry.vertex == vertex) return entry.value;
-  const double value = compute_vertex(vertex, cache);
-  cache->at(vertex) = {vertex, value};
-  return value;
-}
-
-double ReferenceField::compute_vertex(const Vec3i& vertex, VertexCache* cache) const {
-  ReferenceLeaf coarsest;
-  ReferenceLeaf leaf;
-  for (int k = 0; k < 8; ++k) {
-    const Vec3i cell = vertex - corner_offset(k);
-    if (!hierarchy_.domain(hierarchy_.finest_level()).contains(cell)) continue;
-    leaf = find_leaf(cell, leaf);
-    if (leaf.level >= 0 && !std::isnan(leaf.value) && (coarsest.level < 0 || leaf.level < coarsest.level)) coarsest = leaf;
-  }
-  if (coarsest.level < 0) return kNone;
-  const int w = width(coarsest.level);
-  const Vec3i corner = vertex / w;
-  if (corner * w != vertex) return interpolate(2, coarsest.cell * w, w, Vec3d(vertex - coarsest.cell * w) / Vec3d(w), cache);
-  ExactMean mean;
-  const DualCell around = dual_cell(coarsest.level, corner - Vec3i(1));
-  for (const double v : around.values) mean.add(v);
-  return mean.value();
-}
-
-/// Linear along `axis` and the axes below, from the corners that have weight alone: what
-/// lies on a face or edge depends on that face's or edge's vertices.
-double ReferenceField::interpolate(int axis, Vec3i corner, int width, const Vec3d& q, VertexCache* cache) const {
-  if (axis < 0) return vertex_value(corner, cache);
-  Vec3i upper = corner;
-  upper[axis] += width;
-  if (q[axis] == 0) return interpolate(axis - 1, corner, width, q, cache);
-  if (q[axis] == 1) return interpolate(axis - 1, upper, width, q, cache);
-  const double a = interpolate(axis - 1, corner, width, q, cache);
-  const double b = interpolate(axis - 1, upper, width, q, cache);
-  return a + (b - a) * q[axis];
-}
-
-std::array<double, 8> ReferenceField::leaf_vertices(const ReferenceLeaf& leaf, VertexCache* cache) const {
-  std::array<double, 8> values{};
-  for (int k = 0; k < 8; ++k)
-    values[static_cast<std::size_t>(k)] = vertex_value((leaf.cell + corner_offset(k)) * width(leaf.level), cache);
-  return values;
-}
-
-/// Pages of a level that hold part of a finer patch are not final.
-void ReferenceField::split_pages(int level) {
-  auto& split = levels_[static_cast<std::size_t>(level)].split_pages;
-  for (int finer = level + 1; finer < hierarchy_.level_count(); ++finer)
-    for (const PatchView& patch : at(finer).patches)
-      for_each_cell(patch.box.coarsened(width(level) / width(finer)).coarsened(definition_.page_size),
-                    [&](const Vec3i& page) { split.insert(page); });
-}
-
-int ReferenceField::page_level(const Vec3i& finest_cell) const {
-  if (definition_.page_size == 0) return definition_.page_level;
-  int level = 0;
-  while (level < hierarchy_.finest_level() && at(level).split_pages.contains(finest_cell / width(level) / definition_.page_size))
-    ++level;
-  return level;
-}
-
-Box ReferenceField::page_box(int level, const Vec3i& finest_cell) const {
-  const Box domain = hierarchy_.domain(hierarchy_.finest_level());
-  if (definition_.page_size == 0) return domain;
-  // a page may overhang the domain, also past 31 bits
-  const std::int64_t edge = std::int64_t{width(level)} * definition_.page_size;
-  Box box;
-  for (int a = 0; a < 3; ++a) {
-    box.lower[a] = static_cast<int>(finest_cell[a] / edge * edge);
-    box.upper[a] = static_cast<int>(std::min<std::int64_t>(box.lower[a] + edge, domain.upper[a]));
-  }
-  return box;
 }
 
 }  // namespace amrtex

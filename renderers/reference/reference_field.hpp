@@ -1,16 +1,14 @@
-// The mathematics of the filters by search in the hierarchy (shaders/README.md,
-// "Filters"): level values, fills, vertex values, pages. Private to the reference;
-// written from the definitions and from leaf cells alone, not shared with encodings.
+// What filters are defined from (shaders/README.md, "Filters"), by search in the hierarchy: leaves, level values, fills. Private to
+// the reference; written from the definitions and from leaf cells alone, not shared with encodings.
 #pragma once
 
 #include <array>
-#include <optional>
+#include <limits>
 #include <unordered_map>
-#include <unordered_set>
 #include <vector>
 
+#include "renderers/reference/trilinear.hpp"
 #include "structures/mesh/amr_hierarchy.hpp"
-#include "structures/mesh/filter.hpp"
 
 namespace amrtex {
 
@@ -23,13 +21,8 @@ struct CellHash {
   }
 };
 
-/// f = sum of coefficient k times the product of those of x, y, z whose bit is set in k.
-struct Trilinear {
-  std::array<double, 8> coefficients{};
-  /// From the values at the corners of the unit cube, x fastest.
-  static Trilinear through(const std::array<double, 8>& corners);
-  double operator()(const Vec3d& q) const;
-};
+/// Offset of corner k of a cell, x fastest.
+inline Vec3i corner_offset(int k) { return {k & 1, (k >> 1) & 1, k >> 2}; }
 
 struct ReferenceLeaf {
   int level = -1;  ///< -1: no mesh here
@@ -38,27 +31,12 @@ struct ReferenceLeaf {
   double value = 0;  ///< NaN where the leaf has none
 };
 
-/// Values of vertices, kept from one look-up to the next; of one thread.
-class VertexCache {
- public:
-  struct Entry {
-    Vec3i vertex{-1};
-    double value = 0;
-  };
-  Entry& at(const Vec3i& vertex) { return entries_[CellHash{}(vertex) & (kEntries - 1)]; }
-
- private:
-  static constexpr std::size_t kEntries = std::size_t{1} << 16;
-  std::vector<Entry> entries_ = std::vector<Entry>(kEntries);
-};
-
 /// Immutable; safe to use from several threads.
 class ReferenceField {
  public:
-  ReferenceField(const AmrHierarchy& hierarchy, int field, const FilterDefinition& definition);
+  ReferenceField(const AmrHierarchy& hierarchy, int field);
 
   const AmrHierarchy& hierarchy() const { return hierarchy_; }
-  const FilterDefinition& definition() const { return definition_; }
   bool has_missing() const { return has_missing_; }
   int width(int level) const { return levels_[static_cast<std::size_t>(level)].width; }
 
@@ -88,18 +66,6 @@ class ReferenceField {
   };
   BasisCell basis_cell(int level, const Vec3i& lower) const;
 
-  /// Value of filter `linear_vertex` at a corner of finest cells (finest space).
-  /// A function of the place alone: with m the coarsest level whose leaves touch it, the
-  /// mean of 8 v_m where it is a corner of level m, else that leaf's own interpolant.
-  double vertex_value(const Vec3i& vertex, VertexCache* cache) const;
-  /// Vertex values of a leaf, x fastest.
-  std::array<double, 8> leaf_vertices(const ReferenceLeaf& leaf, VertexCache* cache) const;
-
-  /// Level of the page that holds a cell of the finest level (filter `linear_page`).
-  int page_level(const Vec3i& finest_cell) const;
-  /// Box of that page (finest space).
-  Box page_box(int level, const Vec3i& finest_cell) const;
-
  private:
   struct Mean {
     double value = std::numeric_limits<double>::quiet_NaN();
@@ -116,7 +82,6 @@ class ReferenceField {
     int width;
     std::vector<PatchView> patches;
     std::unordered_map<Vec3i, Mean, CellHash> unstored;  // refined cells that no patch of this level stores
-    std::unordered_set<Vec3i, CellHash> split_pages;
   };
 
   const Level& at(int level) const { return levels_[static_cast<std::size_t>(level)]; }
@@ -126,13 +91,9 @@ class ReferenceField {
   Mean mean_of_children(int level, const Vec3i& cell) const;
   void restrict_patch(int level, PatchView& patch) const;
   void find_unstored(int level);
-  void split_pages(int level);
   double neighbour_mean(int level, const Vec3i& cell, int distance) const;
-  double compute_vertex(const Vec3i& vertex, VertexCache* cache) const;
-  double interpolate(int axis, Vec3i corner, int width, const Vec3d& q, VertexCache* cache) const;
 
   const AmrHierarchy& hierarchy_;
-  FilterDefinition definition_;
   std::vector<Level> levels_;
   bool has_missing_ = false;
 };

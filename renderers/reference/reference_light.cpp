@@ -14,9 +14,9 @@ TransferFunction of_one_color(TransferFunction tf) {
 
 }  // namespace
 
-LampScene::LampScene(const Scene& scene, const ReferenceField& f, double extinction_scale, const Vec3d& draw_lower,
+LampScene::LampScene(const Scene& scene, const FilterReference& f, double extinction_scale, const Vec3d& draw_lower,
                      const Vec3d& draw_upper, double largest_part)
-    : field(f),
+    : filter(f),
       table(of_one_color(scene.transfer_function), extinction_scale),
       lower(draw_lower),
       upper(draw_upper),

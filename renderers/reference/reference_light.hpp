@@ -2,17 +2,17 @@
 #pragma once
 
 #include "renderers/reference/ray_integral.hpp"
-#include "renderers/reference/reference_field.hpp"
 #include "renderers/reference/reference_tracer.hpp"
+#include "renderers/scene/scene.hpp"
 
 namespace amrtex {
 
 /// What the secondary rays of one picture share.
 struct LampScene {
-  LampScene(const Scene& scene, const ReferenceField& field, double extinction_scale, const Vec3d& lower, const Vec3d& upper,
+  LampScene(const Scene& scene, const FilterReference& filter, double extinction_scale, const Vec3d& lower, const Vec3d& upper,
             double part);
 
-  const ReferenceField& field;
+  const FilterReference& filter;
   TransferTable table;   ///< extinction alone: of one colour, so that pieces are integrated exactly
   Vec3d position;        ///< finest cells
   Vec3d cells_a_length;  ///< finest cells a world length, along the axes
@@ -25,7 +25,7 @@ struct LampScene {
 /// Traces secondary rays; of one thread.
 class LampTracer {
  public:
-  explicit LampTracer(const LampScene& scene) : scene_(scene), tracer_(scene.field) {}
+  explicit LampTracer(const LampScene& scene) : scene_(scene), tracer_(scene.filter) {}
 
   /// ambient + (1 - ambient) T at a point of finest space in the drawn box.
   double light_at(const Vec3d& p);

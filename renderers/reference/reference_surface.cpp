@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "renderers/reference/reference_clip.hpp"
-#include "renderers/reference/reference_point.hpp"
 
 namespace amrtex {
 namespace {
@@ -85,9 +84,9 @@ void SurfaceFinder::cross(const PieceFunction& f, double length, std::size_t sur
   }
 }
 
-SurfaceScene::SurfaceScene(const Scene& s, const ReferenceField& f, const ReferenceField* color, const TransferTable* table,
+SurfaceScene::SurfaceScene(const Scene& s, const FilterReference& f, const FilterReference* color, const TransferTable* table,
                            double largest_part)
-    : scene(s), settings(s.settings.isosurfaces), field(f), color_field(color), volume(table), part(largest_part) {
+    : scene(s), settings(s.settings.isosurfaces), filter(f), color_filter(color), volume(table), part(largest_part) {
   for (const double value : settings.values) rgb.push_back(surface_color(scene, value));
 }
 
@@ -146,9 +145,9 @@ void SurfacePainter::draw_color(ReferenceTracer& tracer, const std::vector<RayPa
 /// What the surface sends to the eye.
 Vec3d SurfacePainter::color_at(const Vec3d& p, std::size_t surface, const Vec3d& direction) {
   Vec3d rgb = scene_.rgb[surface];
-  if (scene_.color_field != nullptr) {
-    const auto position = position_at(scene_.color_field->hierarchy(), p);
-    const auto value = position ? value_at(*scene_.color_field, *position, &color_vertices_) : std::nullopt;
+  if (color_point_) {
+    const auto position = position_at(scene_.color_filter->hierarchy(), p);
+    const auto value = position ? color_point_->value(*position) : std::nullopt;
     if (value) rgb = surface_color(scene_.scene, *value);
   }
   if (scene_.settings.shading == Shading::none && !around_) return rgb;
@@ -161,7 +160,7 @@ Vec3d SurfacePainter::color_at(const Vec3d& p, std::size_t surface, const Vec3d&
 
 /// Share of the rays from p, cosine-weighted around `up`, that meet no surface within the radius.
 double SurfacePainter::open_share(const Vec3d& p, const Vec3d& up) {
-  const AmrHierarchy& h = scene_.field.hierarchy();
+  const AmrHierarchy& h = scene_.filter.hierarchy();
   const Vec3d cells_a_length = Vec3d(h.cells(h.finest_level())) / (h.domain_upper() - h.domain_lower());
   const Vec3d right = glm::normalize(glm::cross(up, std::abs(up.x) < 0.7 ? Vec3d(1, 0, 0) : Vec3d(0, 1, 0)));
   const Vec3d ahead = glm::cross(up, right);
@@ -190,8 +189,7 @@ double SurfacePainter::open_share(const Vec3d& p, const Vec3d& up) {
 }
 
 Vec3d SurfacePainter::normal_at(const Vec3d& p) {
-  const auto gradient = scene_.settings.shading == Shading::analytic ? derivative_at(scene_.field, p, &vertices_)
-                                                                     : gradient_at(scene_.field, p, &vertices_);
+  const auto gradient = scene_.settings.shading == Shading::analytic ? point_.derivative(p) : point_.gradient(p);
   return unit(gradient.value_or(Vec3d(0)));
 }
 

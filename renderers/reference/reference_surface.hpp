@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "renderers/reference/ray_integral.hpp"
-#include "renderers/reference/reference_field.hpp"
 #include "renderers/reference/reference_parts.hpp"
+#include "renderers/reference/reference_point.hpp"
 #include "renderers/reference/reference_tracer.hpp"
 
 namespace amrtex {
@@ -44,25 +44,26 @@ class SurfaceFinder {
 
 /// What the rays of one picture share.
 struct SurfaceScene {
-  SurfaceScene(const Scene& scene, const ReferenceField& field, const ReferenceField* color_field, const TransferTable* volume,
+  SurfaceScene(const Scene& scene, const FilterReference& filter, const FilterReference* color_filter, const TransferTable* volume,
                double part);
 
   const Scene& scene;
   const Isosurfaces& settings;
-  const ReferenceField& field;
-  const ReferenceField* color_field;  ///< null: the isovalue gives the colour
-  const TransferTable* volume;        ///< null: surfaces alone
-  double part;                        ///< world length of the volume's largest part
-  std::vector<Vec3d> rgb;             ///< one an isovalue
-  Vec3d lower{0}, upper{0};           ///< of what is drawn, finest cells
-  std::vector<ClipPlane> planes;      ///< that cut it, finest cells
+  const FilterReference& filter;
+  const FilterReference* color_filter;  ///< over a second field; null: the isovalue gives the colour
+  const TransferTable* volume;          ///< null: surfaces alone
+  double part;                          ///< world length of the volume's largest part
+  std::vector<Vec3d> rgb;               ///< one an isovalue
+  Vec3d lower{0}, upper{0};             ///< of what is drawn, finest cells
+  std::vector<ClipPlane> planes;        ///< that cut it, finest cells
 };
 
 /// Draws rays; of one thread.
 class SurfacePainter {
  public:
-  explicit SurfacePainter(const SurfaceScene& scene) : scene_(scene) {
-    if (scene.settings.ambient_occlusion) around_.emplace(scene.field);
+  explicit SurfacePainter(const SurfaceScene& scene) : scene_(scene), point_(scene.filter) {
+    if (scene.color_filter != nullptr) color_point_.emplace(*scene.color_filter);
+    if (scene.settings.ambient_occlusion) around_.emplace(scene.filter);
   }
 
   /// `start`: world distance from the eye to the first part; `lamp`: see LightIntegral.
@@ -76,7 +77,8 @@ class SurfacePainter {
   Vec3d normal_at(const Vec3d& p);
 
   const SurfaceScene& scene_;
-  VertexCache vertices_, color_vertices_;
+  ReferencePoint point_;
+  std::optional<ReferencePoint> color_point_;
   std::optional<ReferenceTracer> around_;  // of secondary rays
 };
 

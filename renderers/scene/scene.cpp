@@ -7,6 +7,8 @@
 #include <limits>
 #include <span>
 
+#include "structures/mesh/error.hpp"
+
 namespace amrtex {
 namespace {
 
@@ -441,14 +443,14 @@ void validate_triangles(const RenderSettings& s) {
                                  output_name(s.isosurfaces.output)));
 }
 
-ClipPlane in_finest_cells(const AmrHierarchy& h, const ClipPlane& plane) {
+ClipPlane in_finest_cells(const DomainGeometry& geometry, const ClipPlane& plane) {
   const auto largest = [](const Vec3d& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); };
   const double size = largest(plane.normal);
-  const Vec3d spacing = h.spacing(h.finest_level());
+  const Vec3d spacing = geometry.spacing;
   const double unit = largest(spacing);
   const Vec3d normal = plane.normal / size;
   const Vec3d in_cells = normal * (spacing / unit);
-  const double distance = plane.distance / size - glm::dot(normal, h.domain_lower());
+  const double distance = plane.distance / size - glm::dot(normal, geometry.lower);
   const double scale = largest(in_cells);
   return {in_cells / scale, distance / unit / scale};
 }

@@ -9,7 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "structures/common/encoding.hpp"
+#include "structures/mesh/domain_geometry.hpp"
+#include "structures/mesh/json.hpp"
+#include "structures/mesh/spaces.hpp"
 
 namespace amrtex {
 
@@ -146,7 +148,7 @@ struct ClipPlane {
 };
 inline constexpr std::size_t kMostClipPlanes = 8;
 /// The same plane in cells of the finest level, with a normal whose largest component is 1.
-ClipPlane in_finest_cells(const AmrHierarchy& hierarchy, const ClipPlane& plane);
+ClipPlane in_finest_cells(const DomainGeometry& geometry, const ClipPlane& plane);
 
 /// A face of what is drawn (the domain, or the sub-box) behind which its mirror image is drawn too.
 struct Mirror {

@@ -67,7 +67,7 @@ struct SceneNeeds {
   bool validity = false;            ///< bits are kept though every cell has a value
   bool border = false;              ///< a border is kept though the filter reads none
   bool field_ranges = false;        ///< several fields are drawn: those beside the first have value ranges as well
-  /// First and last value of intervals without extinction, ascending (renderers/scene/scene_bindings.hpp): parts of the structure
+  /// First and last value of intervals without extinction, ascending (renderers/bindings/scene_bindings.hpp): parts of the structure
   /// whose values lie in one of them are left out. Empty: all are kept.
   std::vector<std::array<double, 2>> invisible = {};
   bool operator==(const SceneNeeds&) const = default;

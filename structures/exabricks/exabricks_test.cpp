@@ -1,4 +1,5 @@
 // Facts of `exabricks` alone; what every encoding must do is in tests/.
+#include "renderers/bindings/scene_needs.hpp"
 #include "structures/exabricks/exabricks.hpp"
 
 #include <gmock/gmock.h>
@@ -346,15 +347,16 @@ TEST(ExabricksGradients, OfTheReferenceAreTheLimitsOfDifferences) {
     const AmrHierarchy& h = mesh.hierarchy;
     const Vec3d cell = h.spacing(h.finest_level());
     for (const Filter filter : {Filter::basis, Filter::linear_lod, Filter::linear_vertex}) {
-      const ReferenceField field(h, 0, {filter});
+      const auto reference = make_filter_reference(h, 0, {filter});
+      ReferencePoint point(*reference);
       const auto f = [&](const Vec3d& p) {
         const auto at = position_at(h, p);
-        return at ? value_at(field, *at, nullptr) : std::nullopt;
+        return at ? point.value(*at) : std::nullopt;
       };
       for (const FinestPosition& at : probe_positions(h, 20)) {
         // a quarter and an eighth of a finest cell: no centre and no face of any level
         const Vec3d p = Vec3d(at.cell) + Vec3d(0.25, 0.375, 0.125);
-        const auto derivative = derivative_at(field, p, nullptr);
+        const auto derivative = point.derivative(p);
         for (int a = 0; derivative && a < 3; ++a) {
           Vec3d step(0);
           step[a] = e;

@@ -1,12 +1,26 @@
-// The part of a generator specification that analytic fields and meshes share.
+// Fields whose value and gradient are known exactly, and the part of a generator specification that they share with meshes.
 #pragma once
 
+#include <algorithm>
+#include <memory>
 #include <string>
 
 #include "structures/generators/spec_reader.hpp"
-#include "structures/generators/synthetic.hpp"
+#include "structures/mesh/json.hpp"
+#include "structures/mesh/spaces.hpp"
 
 namespace amrtex {
+
+/// An analytic scalar field over world space.
+class AnalyticField {
+ public:
+  virtual ~AnalyticField() = default;
+  virtual double value(const Vec3d& p_world) const = 0;
+  virtual Vec3d gradient(const Vec3d& p_world) const = 0;  ///< per world length
+};
+
+/// Builds the analytic field of a generator specification.
+std::unique_ptr<AnalyticField> make_analytic_field(const Json& specification);
 
 /// The domain in world space.
 struct WorldBox {

@@ -1,25 +1,11 @@
 // Hierarchies over analytic fields whose value and gradient are known exactly.
 #pragma once
 
-#include <functional>
-#include <memory>
-#include <string>
-
+#include "structures/generators/analytic_fields.hpp"
 #include "structures/mesh/amr_hierarchy.hpp"
 #include "structures/mesh/json.hpp"
 
 namespace amrtex {
-
-/// An analytic scalar field over world space.
-class AnalyticField {
- public:
-  virtual ~AnalyticField() = default;
-  virtual double value(const Vec3d& p_world) const = 0;
-  virtual Vec3d gradient(const Vec3d& p_world) const = 0;  ///< per world length
-};
-
-/// Builds the analytic field of a generator specification.
-std::unique_ptr<AnalyticField> make_analytic_field(const Json& specification);
 
 /// Builds a mesh from a specification as written in experiment files and given to
 /// `amrtex generate` (docs/generate.md lists every key with unit, default and range).

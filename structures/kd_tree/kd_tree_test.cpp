@@ -501,8 +501,8 @@ TEST(KdTree, TraversalsGiveTheSamePicture) {
     const Scene scene = oblique_scene(h, 60, 48);
     const auto draw = [&](const char* traversal, Filtering filtering) {
       const EncodedField field = kd_field(h, Filter::linear_lod, {{"traversal", traversal}}, {.filtering = filtering});
-      const GpuField gpu(field, gl);
-      Raycaster raycaster(gl, h, field, gpu, scene);
+      const Structure structure(gl, field);
+      Raycaster raycaster(gl, h, structure, scene);
       raycaster.draw();
       return raycaster.read().values;
     };
@@ -1065,8 +1065,8 @@ TEST_F(KdTreeBindlessOnGl, PicturesHaveThePoolsBits) {
       for (const Filtering filtering : {Filtering::manual, Filtering::hardware}) {
         const auto draw = [&](const Json& parameters) {
           const EncodedField field = kd_field(h, filter, parameters, {.filtering = filtering});
-          const GpuField gpu(field, gl_);
-          Raycaster raycaster(gl_, h, field, gpu, scene);
+          const Structure structure(gl_, field);
+          Raycaster raycaster(gl_, h, structure, scene);
           raycaster.draw();
           return raycaster.read().values;
         };
@@ -1095,12 +1095,12 @@ TEST_F(KdTreeBindlessOnGl, HandlesAreGivenBackAndNeverPassTheLimit) {
   const auto expected = values_of(probe_on_cpu(h, field, Precision::single_precision, positions));
   // 6 x 501 handles, one after the other
   for (int i = 0; i < 6; ++i) {
-    const GpuField gpu(field, gl_);
-    EXPECT_TRUE(compare(positions, expected, probe_on_gl(gl_, h, field, gpu, positions), 0.0));
+    const Structure structure(gl_, field);
+    EXPECT_TRUE(compare(positions, expected, probe_on_gl(gl_, h, structure, positions), 0.0));
   }
-  const GpuField first(field, gl_);
+  const Structure first(gl_, field);
   auto second = std::make_unique<GpuField>(field, gl_);
-  EXPECT_TRUE(compare(positions, expected, probe_on_gl(gl_, h, field, first, positions), 0.0));
+  EXPECT_TRUE(compare(positions, expected, probe_on_gl(gl_, h, first, positions), 0.0));
   try {
     const GpuField third(field, gl_);
     ADD_FAILURE() << "1503 handles were taken";
@@ -1108,8 +1108,8 @@ TEST_F(KdTreeBindlessOnGl, HandlesAreGivenBackAndNeverPassTheLimit) {
     EXPECT_THAT(e.what(), HasSubstr("501 handles of textures beside 1002 in use, the context takes 1023"));
   }
   second.reset();
-  const GpuField third(field, gl_);
-  EXPECT_TRUE(compare(positions, expected, probe_on_gl(gl_, h, field, third, positions), 0.0));
+  const Structure third(gl_, field);
+  EXPECT_TRUE(compare(positions, expected, probe_on_gl(gl_, h, third, positions), 0.0));
 }
 
 }  // namespace

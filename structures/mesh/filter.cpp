@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <array>
 #include <vector>
 
 #include "structures/mesh/error.hpp"
@@ -12,34 +11,33 @@
 namespace amrtex {
 namespace {
 
-constexpr std::array<Filter, 5> kFilters{Filter::nearest, Filter::linear_lod, Filter::linear_page, Filter::linear_vertex,
-                                         Filter::basis};
+/// The filters whose row `wanted` accepts.
+template <class Wanted>
+std::vector<Filter> filters_where(Wanted&& wanted) {
+  std::vector<Filter> filters;
+  for (const FilterInfo& info : kFilters)
+    if (wanted(info.filter)) filters.push_back(info.filter);
+  return filters;
+}
 
 }  // namespace
 
-std::string_view filter_name(Filter filter) {
-  switch (filter) {
-    case Filter::nearest:
-      return "nearest";
-    case Filter::linear_lod:
-      return "linear_lod";
-    case Filter::linear_page:
-      return "linear_page";
-    case Filter::linear_vertex:
-      return "linear_vertex";
-    case Filter::basis:
-      return "basis";
-  }
-  return "";
+std::span<const Filter> all_filters() {
+  static const std::vector<Filter> filters = filters_where([](Filter) { return true; });
+  return filters;
 }
 
-std::span<const Filter> all_filters() { return kFilters; }
+std::span<const Filter> interpolating_filters() {
+  static const std::vector<Filter> filters = filters_where([](Filter filter) { return interpolates(filter); });
+  return filters;
+}
 
 Filter parse_filter(std::string_view name) {
-  for (Filter f : kFilters)
-    if (filter_name(f) == name) return f;
   std::vector<std::string_view> names;
-  for (Filter f : kFilters) names.push_back(filter_name(f));
+  for (const FilterInfo& info : kFilters) {
+    if (info.name == name) return info.filter;
+    names.push_back(info.name);
+  }
   throw UsageError(fmt::format("no filter {}; accepted: {}", quote(name), fmt::join(names, ", ")));
 }
 

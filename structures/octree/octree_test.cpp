@@ -7,7 +7,7 @@
 #include <bit>
 
 #include "renderers/consumers/raycaster.hpp"
-#include "renderers/scene/scene_bindings.hpp"
+#include "renderers/bindings/scene_bindings.hpp"
 #include "shaders/shader_library.hpp"
 #include "structures/generators/random_mesh.hpp"
 #include "structures/generators/synthetic.hpp"
@@ -201,7 +201,7 @@ TEST(Octree, TheLayoutOfThePaperHoldsTheFieldInEightBits) {
             compare(positions, expected, probe_on_cpu(h, field, Precision::double_precision, positions), tolerance);
         EXPECT_TRUE(on_cpu) << filter_name(filter) << " " << traversal << ": " << on_cpu;
         const Comparison on_gl =
-            compare(positions, expected, probe_on_gl(gl, h, field, GpuField(field, gl), positions), tolerance);
+            compare(positions, expected, probe_on_gl(gl, h, Structure(gl, field), positions), tolerance);
         EXPECT_TRUE(on_gl) << filter_name(filter) << " " << traversal << ": " << on_gl;
       }
 }
@@ -257,8 +257,8 @@ Picture draw(const AmrHierarchy& h, const EncodedField& field, Sampling sampling
   scene.settings.width = scene.settings.height = 48;
   scene.settings.skip = false;
   Context& gl = context(ContextKind::egl);
-  const GpuField gpu(field, gl);
-  Raycaster raycaster(gl, h, field, gpu, scene);
+  const Structure structure(gl, field);
+  Raycaster raycaster(gl, h, structure, scene);
   raycaster.draw();
   if (counts != nullptr) *counts = raycaster.count();
   return raycaster.read();

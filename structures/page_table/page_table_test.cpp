@@ -230,7 +230,7 @@ TEST(PageTable, ThirteenLevelsTakeTwoTablesAndHoldTheField) {
     const EncodedField floats = page_field(h, filter, 4);
     Context& gl = context(ContextKind::egl);
     const Comparison on_gl = compare(positions, reference_values(h, floats.definition, positions),
-                                     probe_on_gl(gl, h, floats, GpuField(floats, gl), positions), 1e-5 * value_range(h));
+                                     probe_on_gl(gl, h, Structure(gl, floats), positions), 1e-5 * value_range(h));
     EXPECT_TRUE(on_gl) << filter_name(filter) << ": " << on_gl;
   }
 }

@@ -73,7 +73,7 @@ TEST(Uniform, IsLinearPageOfAnyLevel) {
       const EncodedField floats = uniform_field(h, Filter::linear_page, {{"level", level}});
       Context& gl = context(ContextKind::egl);
       const Comparison on_gl = compare(positions, reference_values(h, field.definition, positions),
-                                       probe_on_gl(gl, h, floats, GpuField(floats, gl), positions), 1e-5 * value_range(h));
+                                       probe_on_gl(gl, h, Structure(gl, floats), positions), 1e-5 * value_range(h));
       EXPECT_TRUE(on_gl) << on_gl;
     }
   }
@@ -105,7 +105,7 @@ TEST(Uniform, OfVerticesHasTheBitsOfOtherEncodingsWhereLeavesAreFinest) {
     auto positions = probe_positions(h, 60);
     for (FinestPosition& p : positions) p.fraction = (glm::floor(p.fraction * 4096.0) + 0.5) / 4096.0;
     Context& gl = context(ContextKind::egl);
-    const auto probe = [&](const EncodedField& f) { return probe_on_gl(gl, h, f, GpuField(f, gl), positions); };
+    const auto probe = [&](const EncodedField& f) { return probe_on_gl(gl, h, Structure(gl, f), positions); };
     const auto dense = probe(uniform_field(h, Filter::linear_vertex));
     const auto tree = probe(build(h, {&find_encoding("kd_tree"), Filter::linear_vertex, Json::object()}));
     const Comparison result = compare(positions, values_of(tree), dense, [&](std::size_t i) {

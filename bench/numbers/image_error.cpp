@@ -1,4 +1,4 @@
-#include "bench/measure/image_error.hpp"
+#include "bench/numbers/image_error.hpp"
 
 #include <fmt/format.h>
 

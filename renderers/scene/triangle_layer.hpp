@@ -30,8 +30,4 @@ struct TriangleLayer {
 /// One ray through the centre of each pixel (camera_ray), all cores. Of equal distances the first object's counts.
 TriangleLayer trace_triangles(const Scene& scene);
 
-/// Four floats a pixel, row by row from the lower left, as `triangle_layer` in shaders/triangles.glsl; `unit`: world length of
-/// one unit of ray length.
-HostTexture triangle_buffer(const TriangleLayer& layer, double unit);
-
 }  // namespace amrtex

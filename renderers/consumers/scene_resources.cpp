@@ -1,11 +1,9 @@
-#include "renderers/consumers/consumer.hpp"
+#include "renderers/consumers/scene_resources.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "renderers/consumers/box_consumer.hpp"
-#include "renderers/consumers/raycaster.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {
@@ -23,8 +21,8 @@ GlBuffer upload(Context& context, const HostTexture& host) {
 
 }  // namespace
 
-SceneResources::SceneResources(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene)
-    : field_(&field), bindings_(bind_scene(hierarchy, field, scene)) {
+SceneResources::SceneResources(Context& context, const DomainGeometry& geometry, const EncodedField& field, const Scene& scene)
+    : field_(&field), bindings_(bind_scene(geometry, field, scene)) {
   for (const HostTexture& b : bindings_.buffers) buffers_.push_back(upload(context, b));
 }
 
@@ -47,12 +45,6 @@ void SceneResources::bind(Program& program, const GpuField& gpu) const {
 int SceneResources::buffer_count() const {
   const auto is_buffer = [](const HostTexture& t) { return t.kind == HostTexture::Kind::buffer; };
   return static_cast<int>(std::count_if(field_->textures.begin(), field_->textures.end(), is_buffer) + std::ssize(buffers_));
-}
-
-std::unique_ptr<Consumer> make_consumer(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field,
-                                        const GpuField& gpu, const Scene& scene) {
-  if (scene.settings.consumer == ConsumerKind::raycast) return std::make_unique<Raycaster>(context, hierarchy, field, gpu, scene);
-  return std::make_unique<BoxConsumer>(context, hierarchy, field, gpu, scene);
 }
 
 }  // namespace amrtex

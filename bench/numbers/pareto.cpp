@@ -1,4 +1,4 @@
-#include "bench/report/pareto.hpp"
+#include "bench/numbers/pareto.hpp"
 
 #include <algorithm>
 #include <cmath>

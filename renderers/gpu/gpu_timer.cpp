@@ -1,4 +1,4 @@
-#include "renderers/context/gpu_timer.hpp"
+#include "renderers/gpu/gpu_timer.hpp"
 
 #include "structures/mesh/error.hpp"
 

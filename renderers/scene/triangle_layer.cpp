@@ -1,10 +1,6 @@
-#include "renderers/consumers/triangle_layer.hpp"
+#include "renderers/scene/triangle_layer.hpp"
 
 #include <tbb/parallel_for.h>
-
-#include <algorithm>
-
-#include "structures/common/build_tools.hpp"
 
 namespace amrtex {
 namespace {
@@ -32,21 +28,6 @@ TriangleLayer trace_triangles(const Scene& scene) {
           first_of(s.triangles, camera_ray(camera, x, y, s.width, s.height));
   });
   return layer;
-}
-
-HostTexture triangle_buffer(const TriangleLayer& layer, double unit) {
-  constexpr double kFar = 1e30;  // farther than any domain, and a float
-  HostTexture buffer = make_buffer("triangle_layer", TexelFormat::rgba32f, static_cast<std::int64_t>(layer.pixels.size()));
-  auto* texels = buffer.as<glm::vec4>();
-  for (int y = layer.height - 1; y >= 0; --y)
-    for (int x = 0; x < layer.width; ++x) {
-      const TriangleLayer::Pixel& pixel = layer.at(x, y);
-      const double distance = pixel.object < 0 ? 0 : std::min(pixel.distance / unit, kFar);
-      const auto rounded = static_cast<float>(distance);
-      *texels++ = {rounded, static_cast<float>(distance - static_cast<double>(rounded)), static_cast<float>(pixel.light),
-                   static_cast<float>(pixel.object)};
-    }
-  return buffer;
 }
 
 }  // namespace amrtex

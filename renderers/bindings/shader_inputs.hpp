@@ -1,0 +1,28 @@
+// What a program is told before it draws: defines, uniforms and buffers, the same for the GL context and the CPU build of its text.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "renderers/bindings/uniforms.hpp"
+#include "structures/common/host_texture.hpp"
+
+namespace amrtex {
+
+struct SceneBindings {
+  std::vector<std::pair<std::string, int>> defines;
+  UniformValues uniforms;
+  std::vector<HostTexture> buffers;  ///< the transfer function's tables, where it has too many points; triangles
+  bool transfer_exact = true;        ///< evaluated from its points; else from a table of 4096 bins
+  double triangle_seconds = 0;       ///< that finding where rays meet triangles took
+
+  void define(std::string name, int value) { defines.emplace_back(std::move(name), value); }
+  void set(std::string name, double value) { uniforms.push_back({std::move(name), std::vector<double>{value}}); }
+  void set(std::string name, int value) { uniforms.push_back({std::move(name), std::vector<int>{value}}); }
+  void set(std::string name, std::vector<double> values) { uniforms.push_back({std::move(name), std::move(values)}); }
+  /// Of a ray: in double where rays are.
+  void set_ray(std::string name, std::vector<double> values) { uniforms.push_back({std::move(name), std::move(values), true}); }
+};
+
+}  // namespace amrtex

@@ -1,0 +1,35 @@
+// What a scene adds to a structure's part of a program: defines, uniforms, tables on the GPU.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "renderers/bindings/scene_bindings.hpp"
+#include "renderers/gpu/gl_objects.hpp"
+#include "renderers/gpu/gpu_field.hpp"
+#include "renderers/gpu/program.hpp"
+#include "renderers/gpu/shader_assembler.hpp"
+
+namespace amrtex {
+
+class SceneResources {
+ public:
+  /// `field` must outlive the object.
+  SceneResources(Context& context, const DomainGeometry& geometry, const EncodedField& field, const Scene& scene);
+
+  /// Entry file with the defines of field and scene.
+  ShaderKey shader_key(const std::string& entry, bool counting) const;
+  /// Uses the program, sets what the scene tells it and binds the field.
+  void bind(Program& program, const GpuField& gpu) const;
+  /// Storage buffers of field and scene.
+  int buffer_count() const;
+  bool transfer_exact() const { return bindings_.transfer_exact; }
+  double triangle_seconds() const { return bindings_.triangle_seconds; }
+
+ private:
+  const EncodedField* field_;
+  SceneBindings bindings_;
+  std::vector<GlBuffer> buffers_;
+};
+
+}  // namespace amrtex
