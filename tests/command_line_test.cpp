@@ -314,7 +314,8 @@ TEST_F(CommandLine, EncodingsTellFiltersAndParameters) {
     names.push_back(e.at("name"));
     EXPECT_THAT(e.at("filters"), Not(IsEmpty()));
     for (const Json& p : e.at("parameters"))
-      for (const char* key : {"name", "description", "default", "accepted"}) EXPECT_TRUE(p.contains(key)) << p;
+      for (const char* key : {"name", "description", "default", "accepted", "choices", "range"})
+        EXPECT_TRUE(p.contains(key)) << p;
     EXPECT_NE(e.at("supported").get<bool>(), e.at("reason").is_string()) << e;
   }
   std::vector<std::string> expected;

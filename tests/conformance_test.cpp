@@ -54,6 +54,18 @@ TEST(Cases, CoverEveryEncodingAndFilter) {
           << e->name() << " " << filter_name(filter);
 }
 
+TEST(Cases, ArePickedByEncodingFilterOrAWordOfTheirParameters) {
+  for (const EncodingCase& c : encoding_cases()) {
+    for (const EncodingCase& other : cases_named(encoding_cases(), c.encoding->name())) EXPECT_EQ(other.encoding, c.encoding);
+    for (const EncodingCase& other : cases_named(encoding_cases(), filter_name(c.filter))) EXPECT_EQ(other.filter, c.filter);
+    const auto same = cases_named(encoding_cases(), c.name());
+    ASSERT_EQ(same.size(), 1u) << c.name();
+    for (const EncodingCase& other : cases_named(encoding_cases(), c.parameters.dump()))
+      EXPECT_EQ(other.parameters, c.parameters);
+  }
+  EXPECT_EQ(cases_named(encoding_cases(), "").size(), encoding_cases().size());
+}
+
 // ---- the encoding ----
 
 TEST(Conformance, DoubleIsTheReference) {

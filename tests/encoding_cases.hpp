@@ -25,7 +25,8 @@ inline constexpr std::array kContexts{ContextKind::egl, ContextKind::osmesa};
 
 inline ContextInfo handle_limits(ContextKind kind) { return verify::handle_limits(context(kind).info()); }
 
-/// A word that the parameters of all cases must hold (environment AMRTEX_CASES): a slice for another driver.
+/// A word that the names of all cases must hold, of encoding, filter and parameters (environment AMRTEX_CASES): one encoding, or
+/// a slice for another driver.
 inline std::string case_slice() {
   const char* word = std::getenv("AMRTEX_CASES");
   return word == nullptr ? "" : word;
@@ -33,7 +34,7 @@ inline std::string case_slice() {
 
 inline const std::vector<EncodingCase>& encoding_cases() {
   static const std::vector<EncodingCase> cases = [] {
-    std::vector<EncodingCase> all = verify::make_encoding_cases(handle_limits(ContextKind::egl), case_slice());
+    std::vector<EncodingCase> all = cases_named(verify::make_encoding_cases(handle_limits(ContextKind::egl)), case_slice());
     if (all.empty()) throw Error(fmt::format("AMRTEX_CASES={}: no case on this context", case_slice()));
     return all;
   }();

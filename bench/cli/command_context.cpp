@@ -48,9 +48,7 @@ Json encodings_json(const ContextInfo* context) {
     entry["filters"] = Json::array();
     for (Filter f : e->filters()) entry["filters"].push_back(filter_name(f));
     entry["parameters"] = Json::array();
-    for (const ParameterInfo& p : e->parameters())
-      entry["parameters"].push_back(
-          {{"name", p.name}, {"description", p.description}, {"default", p.default_value}, {"accepted", p.accepted}});
+    for (const ParameterInfo& p : e->parameters()) entry["parameters"].push_back(to_json(p));
     const Support support = context != nullptr ? e->supported(*context) : Support{false, "no GL context on this machine"};
     entry["unsupported_values"] = Json::array();
     if (context != nullptr)

@@ -19,9 +19,9 @@ double build_seconds(const Encoding& encoding, const AmrHierarchy& h, const Buil
 void time_left_out(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request, EncodedField& field,
                    int pairs) {
   for (LeftOut& item : field.left_out) {
-    if (item.part == Part::none) continue;
+    if (item.need == Need::none) continue;
     BuildRequest with = request;
-    with.needs = with_part(request.needs, item.part);
+    with.needs = with_need(request.needs, item.need);
     try {
       build_seconds(encoding, hierarchy, with);  // not counted: its pages of memory are the first
       std::vector<double> saved;

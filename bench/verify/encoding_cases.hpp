@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -105,31 +104,12 @@ inline std::vector<Filtering> EncodingCase::filterings() const {
   return all;
 }
 
-/// The values that a parameter's description spells out: its numbers and its quoted names.
-inline std::vector<Json> declared_values(const ParameterInfo& p) {
-  std::vector<Json> values;
-  const std::string& text = p.accepted;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (std::isdigit(static_cast<unsigned char>(text[i])) != 0) {
-      std::size_t digits = 0;
-      values.emplace_back(std::stoi(text.substr(i), &digits));
-      i += digits;
-    } else if (text[i] == '"') {
-      const std::size_t end = text.find('"', i + 1);
-      if (end == std::string::npos) break;
-      values.emplace_back(text.substr(i + 1, end - i - 1));
-      i = end;
-    }
-  }
-  return values;
-}
-
 /// The defaults where they take the filter, else the first declared value of a parameter that does.
 inline EncodingCase default_case(const Encoding& encoding, Filter filter, const ContextInfo& limits = {}) {
   EncodingCase c{&encoding, filter, Json::object(), limits};
   if (accepted(c)) return c;
   for (const ParameterInfo& p : encoding.parameters())
-    for (const Json& value : declared_values(p)) {
+    for (const Json& value : p.accepted.examples()) {
       const EncodingCase other{&encoding, filter, Json{{p.name, value}}, limits};
       if (accepted(other)) return other;
     }
@@ -150,7 +130,7 @@ inline std::string content_of(const EncodingCase& c) {
   return content;
 }
 
-/// The default case, and with it every declared name and the two smallest declared numbers of each parameter, where they change
+/// The default case, and with it every choice of each parameter, of numbers the first two, where they change
 /// anything.
 inline std::vector<EncodingCase> variants(const Encoding& encoding, Filter filter, const ContextInfo& limits = {}) {
   const EncodingCase base = default_case(encoding, filter, limits);
@@ -158,7 +138,7 @@ inline std::vector<EncodingCase> variants(const Encoding& encoding, Filter filte
   std::set<std::string> contents{content_of(base)};
   for (const ParameterInfo& p : encoding.parameters()) {
     int numbers = 0;
-    for (const Json& value : declared_values(p)) {
+    for (const Json& value : p.accepted.examples()) {
       if (value.is_number() && ++numbers > 2) continue;
       EncodingCase c = base;
       c.parameters[p.name] = value;
@@ -169,13 +149,18 @@ inline std::vector<EncodingCase> variants(const Encoding& encoding, Filter filte
   return cases;
 }
 
-/// All cases of a context whose parameters hold the word `slice`.
-inline std::vector<EncodingCase> make_encoding_cases(const ContextInfo& limits, std::string_view slice = "") {
+/// Those whose name, of encoding, filter and parameters, holds a word.
+inline std::vector<EncodingCase> cases_named(std::vector<EncodingCase> cases, std::string_view word) {
+  std::erase_if(cases, [&](const EncodingCase& c) { return c.name().find(word) == std::string::npos; });
+  return cases;
+}
+
+/// All cases of a context.
+inline std::vector<EncodingCase> make_encoding_cases(const ContextInfo& limits) {
   std::vector<EncodingCase> all;
   for (const Encoding* e : all_encodings())
     for (const Filter filter : e->filters())
-      for (EncodingCase& c : variants(*e, filter, limits))
-        if (c.parameters.dump().find(slice) != std::string::npos) all.push_back(std::move(c));
+      for (EncodingCase& c : variants(*e, filter, limits)) all.push_back(std::move(c));
   return all;
 }
 

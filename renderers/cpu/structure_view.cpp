@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "renderers/cpu/sampled_reference.hpp"
-#include "renderers/scene/scene_bindings.hpp"
+#include "renderers/bindings/scene_bindings.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {

@@ -13,7 +13,7 @@
 
 #include "structures/mesh/spaces.hpp"
 
-namespace amrtex::kd {
+namespace amrtex::packing {
 
 /// Texture axes beyond this cost bits of the normalised coordinate (hardware filtering).
 inline constexpr int kPreferredEdge = 1024;
@@ -271,4 +271,4 @@ inline Packing pack_best_fit(std::span<const Vec3i> bricks, int limit, std::int6
   return best;
 }
 
-}  // namespace amrtex::kd
+}  // namespace amrtex::packing

@@ -57,28 +57,14 @@ std::uint32_t encode_range(const EncodedField& field, int number, ValueRange ran
   return encode_range(range, origin, field.storage, field.scale_of(number));
 }
 
-std::int64_t MoreRanges::bytes(const BuildRequest& request, std::int64_t regions) {
-  return request.needs.field_ranges ? 4 * std::max<std::int64_t>(regions, 1) * (request.field_count() - 1) : 0;
+MoreRanges::MoreRanges(EncodedField& field, std::string_view name) : field_(&field) {
+  HostTexture* buffer = field.find(name);
+  words_ = buffer != nullptr ? buffer->as<std::uint32_t>() : nullptr;
 }
 
-MoreRanges::MoreRanges(const Encoding& encoding, const BuildRequest& request, const std::string& name, std::int64_t regions)
-    : fields_(request.field_count()) {
-  const std::int64_t size = bytes(request, regions);
-  if (size == 0) return;
-  if (size > request.context.max_buffer_bytes)
-    throw UnsupportedError(
-        fmt::format("encoding {}: value ranges of further fields take {} bytes, a buffer of this context at most {}",
-                    encoding.name(), size, request.context.max_buffer_bytes));
-  buffer_ = make_buffer(name, TexelFormat::r32ui, size / 4);
-}
-
-void MoreRanges::set(const EncodedField& field, std::int64_t region, int number, ValueRange range) {
+void MoreRanges::set(std::int64_t region, int number, ValueRange range) const {
   if (number == 0 || !needed()) return;
-  buffer_.as<std::uint32_t>()[region * (fields_ - 1) + number - 1] = encode_range(field, number, range);
-}
-
-void MoreRanges::move_to(EncodedField& field) {
-  if (needed()) field.textures.push_back(std::move(buffer_));
+  words_[region * (field_->field_count - 1) + number - 1] = encode_range(*field_, number, range);
 }
 
 bool hidden(const SceneNeeds& needs, ValueRange range, double origin, Storage storage, StorageScale scale) {
@@ -128,6 +114,11 @@ void write_box(const Box& box, std::uint32_t fourth, std::uint32_t eighth, std::
   }
   words[3] = fourth;
   words[7] = eighth;
+}
+
+double leaked_value(const FieldStatistics& s, const Vec3i& pool) {
+  const double weight = 3 * std::ldexp(3.0, -24) * std::max({pool.x, pool.y, pool.z});
+  return weight * std::max({s.max - s.min, std::abs(s.min), std::abs(s.max)});
 }
 
 bool power_of_two_ratios(const AmrHierarchy& hierarchy) {
@@ -219,19 +210,6 @@ EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy
                           {"AMRTEX_SCALED_STORAGE", scaled ? 1 : 0},
                           {"AMRTEX_LEVEL_OF_DETAIL", request.needs.level_of_detail ? 1 : 0}};
   return field;
-}
-
-int integer_parameter(const Encoding& encoding, const Json& parameters, std::string_view name) {
-  const Json& value = parameters.at(std::string(name));
-  if (value.is_number_integer()) {
-    const auto wide = value.get<std::int64_t>();
-    if (wide == static_cast<int>(wide)) return static_cast<int>(wide);
-  }
-  for (const ParameterInfo& p : encoding.parameters())
-    if (p.name == name)
-      throw UsageError(
-          fmt::format("encoding {}: parameter {} is {}; accepted: {}", encoding.name(), name, value.dump(), p.accepted));
-  throw UsageError(fmt::format("encoding {}: parameter {} is {}", encoding.name(), name, value.dump()));
 }
 
 }  // namespace amrtex

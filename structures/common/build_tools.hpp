@@ -38,22 +38,19 @@ std::uint32_t encode_range(ValueRange range, double origin, Storage storage, Sto
 /// The same of field number `number` of a structure; kVacantRange where the range is empty.
 std::uint32_t encode_range(const EncodedField& field, int number, ValueRange range);
 
-/// Coded ranges of the fields beside the first, as fetch_range() reads them: those of a region side by side. Without data, and
-/// without bytes, where the scene needs none (SceneNeeds::field_ranges).
+/// Writes coded ranges of the fields beside the first, as fetch_range() reads them: those of a region side by side, in the part
+/// that Layout::more_ranges() declares.
 class MoreRanges {
  public:
-  static std::int64_t bytes(const BuildRequest& request, std::int64_t regions);
-  /// `name`: of the buffer in the encoding's GLSL. Throws UnsupportedError where it passes the context's limit.
-  MoreRanges(const Encoding& encoding, const BuildRequest& request, const std::string& name, std::int64_t regions);
-  bool needed() const { return !buffer_.data.empty(); }
-  /// For threads that have regions of their own. Nothing where no ranges are needed, or where `number` is 0.
-  void set(const EncodedField& field, std::int64_t region, int number, ValueRange range);
-  /// Moves the buffer to the field's, where there is one.
-  void move_to(EncodedField& field);
+  /// `name`: of the part. Where it is absent, set() does nothing.
+  MoreRanges(EncodedField& field, std::string_view name);
+  bool needed() const { return words_ != nullptr; }
+  /// For threads that have regions of their own. Nothing where `number` is 0.
+  void set(std::int64_t region, int number, ValueRange range) const;
 
  private:
-  int fields_;
-  HostTexture buffer_;
+  const EncodedField* field_;
+  std::uint32_t* words_;
 };
 
 /// Stores `count` values side by side from texel `first`; NaN is stored as 0.
@@ -67,17 +64,21 @@ HostTexture make_buffer(std::string name, TexelFormat format, std::int64_t eleme
 /// Writes a box as two times four words: lower corner and `fourth`, upper corner and `eighth`.
 void write_box(const Box& box, std::uint32_t fourth, std::uint32_t eighth, std::uint32_t* words);
 
-/// What a border of one cell around each brick would take in all fields. Bricks have their `cells` (a Box).
+/// Cells of a border of one cell around each brick. Bricks have their `cells` (a Box).
 template <class Bricks>
-LeftOut border_left_out(const Bricks& bricks, std::string why, const BuildRequest& request) {
-  std::int64_t texels = 0;
-  for (const auto& brick : bricks) texels += brick.cells.grown(1).cells() - brick.cells.cells();
-  return {"border layer", std::move(why), texels * request.field_count() * texel_bytes(request.storage), Part::border};
+std::int64_t border_cells(const Bricks& bricks) {
+  std::int64_t cells = 0;
+  for (const auto& brick : bricks) cells += brick.cells.grown(1).cells() - brick.cells.cells();
+  return cells;
 }
 
 /// Words of 32 bits for `bits` bits.
 constexpr std::int64_t words_for_bits(std::int64_t bits) { return (bits + 31) / 32; }
 inline void set_bit(std::uint32_t* words, std::int64_t bit) { words[bit / 32] |= 1U << (bit % 32); }
+
+/// A texture unit sees a little of the texel beyond the last: the rounding of the normalised coordinate is 3 times 2^-24 of the
+/// pool an axis. What of it may be added to a value where the neighbour may hold anything of the field.
+double leaked_value(const FieldStatistics& statistics, const Vec3i& pool);
 
 /// Does every refinement ratio equal a power of two?
 bool power_of_two_ratios(const AmrHierarchy& hierarchy);
@@ -96,8 +97,5 @@ Filtering stored_filtering(const BuildRequest& request);
 /// Fields of EncodedField that are filled in the same way for every encoding.
 EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request,
                          const Json& parameters);
-
-/// Reads an integer parameter. Throws UsageError naming what is accepted.
-int integer_parameter(const Encoding& encoding, const Json& parameters, std::string_view name);
 
 }  // namespace amrtex

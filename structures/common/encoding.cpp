@@ -76,6 +76,10 @@ const HostTexture* EncodedField::find(std::string_view name) const {
   return nullptr;
 }
 
+HostTexture* EncodedField::find(std::string_view name) {
+  return const_cast<HostTexture*>(std::as_const(*this).find(name));  // its own
+}
+
 const Encoding& find_encoding(std::string_view name) {
   for (const Encoding* e : all_encodings())
     if (e->name() == name) return *e;
@@ -83,23 +87,23 @@ const Encoding& find_encoding(std::string_view name) {
                                join_names(all_encodings(), [](const Encoding* e) { return e->name(); })));
 }
 
-SceneNeeds with_part(SceneNeeds needs, Part part) {
-  switch (part) {
-    case Part::none:
+SceneNeeds with_need(SceneNeeds needs, Need need) {
+  switch (need) {
+    case Need::none:
       break;
-    case Part::validity:
+    case Need::validity:
       needs.validity = true;
       break;
-    case Part::border:
+    case Need::border:
       needs.border = true;
       break;
-    case Part::value_ranges:
+    case Need::value_ranges:
       needs.value_ranges = true;
       break;
-    case Part::gradients:
+    case Need::gradients:
       needs.gradients = true;
       break;
-    case Part::hidden:
+    case Need::hidden:
       needs.invisible.clear();
       break;
   }
@@ -113,7 +117,12 @@ Json complete_parameters(const Encoding& encoding, const Json& given) {
       throw UsageError(fmt::format("encoding {}: no parameter '{}'; accepted: {}", encoding.name(), key,
                                    known.empty() ? "none" : join_names(known, [](const ParameterInfo& p) { return p.name; })));
   Json complete = Json::object();
-  for (const ParameterInfo& p : known) complete[p.name] = given.contains(p.name) ? given[p.name] : p.default_value;
+  for (const ParameterInfo& p : known) {
+    const Json& value = complete[p.name] = given.contains(p.name) ? given[p.name] : p.default_value;
+    if (!p.accepted.has(value))
+      throw UsageError(
+          fmt::format("encoding {}: parameter {} is {}; accepted: {}", encoding.name(), p.name, value.dump(), p.accepted.text()));
+  }
   encoding.check_parameters(complete);
   return complete;
 }
@@ -164,14 +173,6 @@ void require_fields(const Encoding& encoding, const AmrHierarchy& hierarchy, con
     if (request.field_at(i) < 0 || request.field_at(i) >= known)
       throw UsageError(fmt::format("encoding {}: no field with index {}; {} has {}", encoding.name(), request.field_at(i),
                                    hierarchy.name(), known));
-}
-
-void require_budget(const Encoding& encoding, std::int64_t bytes, const BuildRequest& request) {
-  if (bytes > request.memory_limit)
-    throw BudgetError(fmt::format("encoding {} with {}: needs {} bytes ({:.1f} MiB), the memory limit is {} bytes ({:.1f} MiB)",
-                                  encoding.name(), request.parameters.dump(), bytes, static_cast<double>(bytes) / 1048576.0,
-                                  request.memory_limit, static_cast<double>(request.memory_limit) / 1048576.0),
-                      bytes);
 }
 
 }  // namespace amrtex

@@ -12,6 +12,8 @@
 
 #include "structures/common/draw_tree.hpp"
 #include "structures/common/host_texture.hpp"
+#include "structures/common/parameter.hpp"
+#include "structures/common/part.hpp"
 #include "structures/mesh/amr_hierarchy.hpp"
 #include "structures/mesh/filter.hpp"
 #include "structures/mesh/json.hpp"
@@ -44,16 +46,6 @@ struct Support {
   std::string reason;  ///< why not
 };
 
-/// Parts of structures that come and go with a scene's needs.
-enum class Part {
-  none,          ///< no need of a scene brings it
-  validity,      ///< bits that tell cells without a value
-  border,        ///< cells around a brick or page
-  value_ranges,  ///< by which regions are skipped
-  gradients,
-  hidden  ///< what the transfer function makes invisible
-};
-
 /// The one switch for what builders and shaders leave out (computed from the scene).
 struct SceneNeeds {
   Filter filter = Filter::nearest;
@@ -74,25 +66,8 @@ struct SceneNeeds {
   bool keeps_validity() const { return everything || validity; }
   bool keeps_border() const { return everything || border; }
 };
-/// The same needs, and this part although nothing reads it. The needs themselves for Part::none.
-SceneNeeds with_part(SceneNeeds needs, Part part);
-
-struct LeftOut {
-  std::string what, why;
-  std::int64_t bytes = 0;
-  Part part = Part::none;              ///< what with_part() brings it back with
-  std::optional<double> seconds = {};  ///< of the build, where they were measured (bench/measure/left_out_time.hpp)
-};
-
-/// A build parameter: what the command line and experiment files may say.
-struct ParameterInfo {
-  std::string name;
-  std::string description;  ///< with its unit
-  Json default_value;
-  std::string accepted;  ///< for error messages: "an integer from 4 to 128"
-  /// Values between which the best depends on mesh and scene: what `amrtex advise` tries. Empty: the default alone.
-  std::vector<Json> compared = {};
-};
+/// The same needs, and what brings a part back although nothing reads it. The needs themselves for Need::none.
+SceneNeeds with_need(SceneNeeds needs, Need need);
 
 /// A value of a parameter that a context cannot take.
 struct UnsupportedValue {
@@ -132,6 +107,7 @@ struct EncodedField {
   std::vector<LeftOut> left_out;
   Json statistics;                   ///< counts of the structure: pages, nodes, fill, ...
   std::int64_t host_peak_bytes = 0;  ///< arrays that the build itself allocated at once, the result included
+  std::vector<Part> parts;           ///< that the encoding declared, absent ones too; `textures` are those that are present
 
   /// How field number `number` is stored. Throws UsageError naming how many fields there are.
   StorageScale scale_of(int number) const;
@@ -141,6 +117,7 @@ struct EncodedField {
   /// Hash over names, formats, sizes and contents of everything the shader reads.
   std::string content_hash() const;
   const HostTexture* find(std::string_view name) const;
+  HostTexture* find(std::string_view name);
 };
 
 struct BuildRequest {
@@ -164,10 +141,12 @@ class Encoding {
   virtual std::string_view name() const = 0;
   /// The filters of this encoding under some parameters (for tables and messages).
   virtual std::span<const Filter> filters() const = 0;
-  virtual std::vector<ParameterInfo> parameters() const = 0;
-  /// Throws UsageError for values that no mesh would make acceptable. `parameters` is complete.
-  virtual void check_parameters(const Json& parameters) const = 0;
-  virtual Support supported(const ContextInfo& context) const = 0;
+  virtual std::vector<ParameterInfo> parameters() const { return {}; }
+  /// Rules across parameters: throws UsageError for what no mesh would make acceptable. `parameters` is complete, and each value
+  /// is one that ParameterInfo::accepted has.
+  virtual void check_parameters(const Json& /*parameters*/) const {}
+  /// Can it be drawn in a context under any parameters? Else why not.
+  virtual Support supported(const ContextInfo& /*context*/) const { return {}; }
   /// Values of parameters that build() refuses for want of something in the context, for tables and messages.
   virtual std::vector<UnsupportedValue> unsupported_values(const ContextInfo& /*context*/) const { return {}; }
   /// Can its GLSL give the derivative of f under a filter (SceneNeeds::analytic_gradients)? Else why not.
@@ -198,7 +177,5 @@ void require_analytic_gradients(const Encoding& encoding, const SceneNeeds& need
 /// Throws UsageError that says how many fields are supported, or which index the mesh does not have, and
 /// UnsupportedError where parts are to be left out and the encoding has none that could be.
 void require_fields(const Encoding& encoding, const AmrHierarchy& hierarchy, const BuildRequest& request);
-/// Throws BudgetError with the bytes needed when `bytes` passes the limit.
-void require_budget(const Encoding& encoding, std::int64_t bytes, const BuildRequest& request);
 
 }  // namespace amrtex

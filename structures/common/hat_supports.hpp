@@ -67,15 +67,17 @@ class SupportList {
     add(nodes, 0, code);
   }
 
-  std::int64_t bytes() const { return 32 * std::max<std::int64_t>(static_cast<std::int64_t>(entries_.size()), 1); }
-  HostTexture texture() const {
-    HostTexture t = make_buffer("basis_supports", TexelFormat::rgba32ui, bytes() / 16);
-    auto* words = t.as<std::uint32_t>();
+  std::int64_t bytes() const { return part().bytes(); }
+  Part part() const {
+    return buffer_part("basis_supports", "boxes of supports", TexelFormat::rgba32ui,
+                       2 * std::max<std::int64_t>(static_cast<std::int64_t>(entries_.size()), 1));
+  }
+  void write(HostTexture& buffer) const {
+    auto* words = buffer.as<std::uint32_t>();
     for (const Entry& e : entries_) {
       write_box(e.box, e.code, e.next == entries_.size() ? 0U : static_cast<std::uint32_t>(e.next), words);
       words += 8;
     }
-    return t;
   }
 
  private:

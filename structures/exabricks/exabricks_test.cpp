@@ -16,8 +16,7 @@
 #include "structures/exabricks/regions.hpp"
 #include "structures/generators/random_mesh.hpp"
 #include "structures/generators/synthetic.hpp"
-#include "tests/encoding_cases.hpp"
-#include "tests/pictures.hpp"
+#include "tests/leave_out_cases.hpp"
 
 namespace amrtex {
 namespace {
@@ -506,8 +505,16 @@ TEST(Exabricks, TooManyRegionsAreCountedAndAWiderBrickSuggested) {
     find_encoding("exabricks").build(h, request);
     ADD_FAILURE() << "built";
   } catch (const UnsupportedError& e) {
-    EXPECT_THAT(e.what(), AllOf(HasSubstr("regions take 16384 bytes"), HasSubstr("brick_width above 4")));
+    EXPECT_THAT(e.what(), AllOf(HasSubstr("regions: 16384 bytes"), HasSubstr("brick_width above 4")));
   }
+}
+
+TEST(Exabricks, NearestVolumesHoldCellsRegionsAndTheirTreeAndFivePercent) {
+  expect_nearest_holds_little_more("exabricks", [](const AmrHierarchy& h, const EncodedField& f) {
+    // eight words and a range a region, two words a node, an entry and a node of the start grid
+    return h.leaf_cells() * 4 + counted(f, "regions") * 36 + counted(f, "nodes") * 8 + f.find("exa_start")->bytes() +
+           f.find("exa_start_nodes")->bytes();
+  });
 }
 
 }  // namespace

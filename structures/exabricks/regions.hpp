@@ -43,6 +43,10 @@ struct RegionNode {
   int region = -1;  ///< of a leaf; -1: no mesh
 };
 
+/// As start_grid.hpp asks.
+inline int plane_of(const AmrHierarchy& /*h*/, const RegionNode& n, const Box& /*box*/) { return n.plane; }
+inline bool is_drawn(const RegionNode& n) { return n.region >= 0; }
+
 struct RegionSet {
   std::vector<RegionNode> nodes;  ///< over the whole domain, children after their parent
   std::vector<Region> regions;    ///< brick by brick

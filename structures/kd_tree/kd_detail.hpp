@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "kd_partition.hpp"
-#include "start_grid.hpp"
+#include "structures/common/start_grid.hpp"
 
 namespace amrtex::kd {
 

@@ -1,8 +1,9 @@
 // The tree's drawn leaves as boxes for consumers that draw box by box.
 #pragma once
 
-#include "start_grid.hpp"
+#include "kd_partition.hpp"
 #include "structures/common/draw_tree.hpp"
+#include "structures/common/start_grid.hpp"
 
 namespace amrtex::kd {
 

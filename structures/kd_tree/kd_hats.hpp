@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "kd_partition.hpp"
-#include "start_grid.hpp"
 #include "structures/common/hat_supports.hpp"
+#include "structures/common/start_grid.hpp"
 #include "structures/mesh/level_values.hpp"
 
 namespace amrtex::kd {

@@ -33,6 +33,12 @@ struct Node {
   bool finished = false;  ///< false while the tree is built
 };
 
+/// As start_grid.hpp asks.
+inline int plane_of(const AmrHierarchy& h, const Node& n, const Box& box) {
+  return box.lower[n.axis] + n.split * h.cell_width(n.level);
+}
+inline bool is_drawn(const Node& n) { return n.leaf >= 0; }
+
 /// Cells of one subgrid that are drawn: a leaf, which no other subgrid refines, or with a level of detail
 /// (kd_detail.hpp) cells that are refined everywhere.
 struct Leaf {

@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <bit>
+#include <set>
 
 #include "renderers/consumers/raycaster.hpp"
 #include "renderers/bindings/scene_bindings.hpp"
@@ -12,7 +14,7 @@
 #include "structures/generators/random_mesh.hpp"
 #include "structures/generators/synthetic.hpp"
 #include "structures/octree/octree_layout.h"
-#include "tests/pictures.hpp"
+#include "tests/leave_out_cases.hpp"
 
 namespace amrtex {
 namespace {
@@ -619,6 +621,46 @@ TEST(OctreeControl, OctantsAndAverages) {
     std::rotate(t.data.begin(), t.data.begin() + 8, t.data.end());
   }))) << "averages of the next node";
   EXPECT_TRUE(noticed(with("tex_octree_nodes", [](HostTexture& t) { t.as<std::uint32_t>()[0] ^= 1U; }))) << "a bit of the mask";
+}
+
+// ---- pruning
+
+/// Nodes of the octree of which no value is read for a leaf that shows something, from the mesh alone. A node is the
+/// parent of eight cells: of 2^depth finest cells, at a multiple of its width.
+HiddenTexels hidden_nodes(const AmrHierarchy& h, const EncodedField& f, const TransferFunction& tf) {
+  const int reach = f.definition.filter == Filter::nearest ? 0 : 1;
+  const int root = f.statistics.at("depths").get<int>();
+  std::set<std::array<int, 4>> read;
+  const auto read_cell = [&](int level, const Vec3i& cell) {  // it stands in its leaf's node where the leaf is wider
+    const int width = std::max(h.cell_width(level), h.cell_width(h.find_leaf(cell * h.cell_width(level))->level));
+    for (int depth = std::countr_zero(static_cast<unsigned>(width)) + 1; depth <= root; ++depth) {
+      const Vec3i at = (cell * h.cell_width(level)) >> depth;
+      if (!read.insert({depth, at.x, at.y, at.z}).second) return;
+    }
+  };
+  for (int level = 0; level < h.level_count(); ++level)
+    for_each_cell(h.domain(level), [&](const Vec3i& c) {
+      const std::optional<LeafCell> leaf = h.find_leaf(c * h.cell_width(level));
+      if (leaf->level != level) return;
+      const Box about = intersection({c - Vec3i(reach), c + Vec3i(1 + reach)}, h.domain(level));
+      ValueRange range;
+      for_each_cell(about, [&](const Vec3i& i) { range.add(h.level_value(level, i, 0)); });
+      if (tf.max_extinction(range.min, range.max) > 0) for_each_cell(about, [&](const Vec3i& i) { read_cell(level, i); });
+    });
+  const auto nodes = f.statistics.at("nodes").get<std::int64_t>();
+  return {8 * (nodes - static_cast<std::int64_t>(read.size())), 8 * nodes};
+}
+
+TEST(OctreePrune, DropsNineTenthsOfTheNodesThatAreHidden) {
+  for (const Filter filter : find_encoding("octree").filters())
+    expect_drops_what_is_hidden(default_case(find_encoding("octree"), filter), hidden_nodes);
+}
+
+TEST(Octree, NearestVolumesHoldValuesNodesAndStartGridAndFivePercent) {
+  expect_nearest_holds_little_more("octree", [](const AmrHierarchy&, const EncodedField& f) {
+    // eight values and a word of children a node, an entry of the start grid
+    return counted(f, "nodes") * (8 * 4 + 4) + counted(f, "start_grid_cells") * 4;
+  });
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 
 #include "structures/generators/synthetic.hpp"
 #include "structures/page_table/page_table_layout.h"
-#include "tests/encoding_cases.hpp"
+#include "tests/leave_out_cases.hpp"
 
 namespace amrtex {
 namespace {
@@ -353,6 +353,40 @@ TEST_F(PageTableControl, AnEntrysLevelAndTwoEntriesSwapped) {
     EXPECT_TRUE(noticed(with([](HostTexture& t, std::int64_t bytes) { std::fill_n(t.data.begin(), bytes, std::byte{0}); })))
         << "absent";
   }
+}
+
+// ---- pruning ----
+
+HiddenTexels hidden_pages(const EncodedField& f, const TransferFunction& tf) {
+  HiddenTexels count;
+  const HostTexture& pool = *f.find("tex_pages");
+  const int edge = define(f, "AMRTEX_PAGE_EDGE");
+  const Vec3i shift = uniform(f, "u_pool_shift");
+  for (int i = 0; i < f.statistics.at("pages").get<int>(); ++i) {
+    const Vec3i at = Vec3i(i & ((1 << shift.x) - 1), (i >> shift.x) & ((1 << shift.y) - 1), i >> (shift.x + shift.y)) * edge;
+    const Box texels{at, at + Vec3i(edge)};
+    count.all += texels.cells();
+    if (!shows(tf, f, pool, texels)) count.hidden += texels.cells();
+  }
+  return count;
+}
+
+TEST(PageTablePrune, DropsNineTenthsOfThePagesThatAreHidden) {
+  for (const Filter filter : find_encoding("page_table").filters())
+    expect_drops_what_is_hidden(
+        default_case(find_encoding("page_table"), filter),
+        [](const AmrHierarchy&, const EncodedField& f, const TransferFunction& tf) { return hidden_pages(f, tf); });
+}
+
+TEST(PageTablePrune, KeepsTheRegionsThatRaysMeet) {
+  for (const Filter filter : find_encoding("page_table").filters())
+    expect_same_steps(default_case(find_encoding("page_table"), filter));
+}
+
+TEST(PageTable, NearestVolumesHoldPagesAndTableAndFivePercent) {
+  expect_nearest_holds_little_more("page_table", [](const AmrHierarchy&, const EncodedField& f) {
+    return counted(f, "pages") * counted(f, "page_texels") * 4 + counted(f, "table_entries") * 8;
+  });
 }
 
 }  // namespace

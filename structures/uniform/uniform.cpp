@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "structures/common/build_tools.hpp"
+#include "structures/common/layout.hpp"
 #include "structures/mesh/level_values.hpp"
 #include "structures/mesh/vertex_values.hpp"
 #include "uniform_layout.h"
@@ -31,19 +32,13 @@ struct Plan {
   int fields;
   bool validity;
   bool may_border;  ///< the filter reads one where cells are missing
-  bool ranges;
-  std::int64_t more_ranges;  ///< bytes of those of further fields
-  int border;     ///< texels round the domain: the fills of cells outside, which clamping gives only where no cell is missing
-  bool vertices;  ///< texels are vertices, not cells
+  int border;       ///< texels round the domain: the fills of cells outside, which clamping gives only where no cell is missing
+  bool vertices;    ///< texels are vertices, not cells
   Box texels() const { return vertices ? Box{Vec3i(0), cells + Vec3i(1)} : Box{Vec3i(0), cells}.grown(border); }
   std::int64_t cell_count() const { return std::int64_t{cells.x} * cells.y * cells.z; }
   std::int64_t block_count() const { return std::int64_t{blocks.x} * blocks.y * blocks.z; }
   /// Words of validity bits: each field's from a new word.
   std::int64_t validity_words() const { return fields * words_for_bits(cell_count()); }
-  std::int64_t bytes(Storage storage) const {
-    return fields * texels().cells() * texel_bytes(storage) + (validity ? 4 * validity_words() : 0) +
-           (ranges ? 4 * block_count() : 0) + more_ranges;
-  }
 };
 
 class Uniform final : public Encoding {
@@ -51,92 +46,111 @@ class Uniform final : public Encoding {
   std::string_view name() const override { return "uniform"; }
   std::span<const Filter> filters() const override { return kFilters; }
   std::vector<ParameterInfo> parameters() const override {
-    return {{"level", "level whose cells the texture has", nullptr, "a level of the mesh, or null for the finest"}};
+    return {{"level", "level whose cells the texture has; null: the mesh's finest", nullptr, either({nullptr}, {0})}};
   }
-  void check_parameters(const Json& parameters) const override { level(parameters, std::numeric_limits<int>::max()); }
-  Support supported(const ContextInfo&) const override { return {}; }
   Support level_of_detail() const override { return {false, "its one texture holds one level (parameter level)"}; }
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
   EncodedField build_blocks(const AmrHierarchy& hierarchy, const BuildRequest& request) const;
-  int level(const Json& parameters, int finest) const;
-  Plan plan(const AmrHierarchy& hierarchy, const BuildRequest& request, const Json& parameters) const;
+  int level(const Json& parameters, const AmrHierarchy& h) const;
+  Plan plan(const AmrHierarchy& h, const BuildRequest& request, const Json& parameters) const;
+  /// A deep mesh has more bytes than 64 bits count, and no texture for them.
+  void require_countable(const BuildRequest& request, const Plan& p) const;
+  Layout layout(const BuildRequest& request, const Plan& p) const;
 };
 
-int Uniform::level(const Json& parameters, int finest) const {
-  if (parameters.at("level").is_null()) return finest;
-  const int level = integer_parameter(*this, parameters, "level");
-  if (level < 0 || level > finest)
+int Uniform::level(const Json& parameters, const AmrHierarchy& h) const {
+  const Json& value = parameters.at("level");
+  if (value.is_null()) return h.finest_level();
+  const int level = value.get<int>();
+  if (level > h.finest_level())
     throw UsageError(fmt::format("encoding uniform: parameter level is {}; accepted: 0 to {}, or null for the finest", level,
-                                 finest == std::numeric_limits<int>::max() ? "the mesh's finest level" : std::to_string(finest)));
+                                 h.finest_level()));
   return level;
 }
 
 Plan Uniform::plan(const AmrHierarchy& h, const BuildRequest& request, const Json& parameters) const {
   Plan p{};
-  p.level = level(parameters, h.finest_level());
+  p.level = level(parameters, h);
   p.cells = h.cells(p.level);
   p.blocks = ceil_div(p.cells, kBlock);
   p.fields = request.field_count();
   p.validity = any_missing(h, request);
-  p.ranges = request.needs.value_ranges;
-  p.more_ranges = MoreRanges::bytes(request, p.block_count());
   p.vertices = request.needs.filter == Filter::linear_vertex;
   p.may_border = request.needs.filter == Filter::linear_page;
   p.border = p.may_border && (request.needs.keeps_border() || cells_missing(h, request)) ? 1 : 0;
-  const Vec3i texels = p.texels().size();
-  // a deep mesh has more bytes than 64 bits count, and no texture for them
-  const double about = p.fields * static_cast<double>(texels.x) * texels.y * texels.z * texel_bytes(request.storage);
-  const bool countable = about < 0x1p60;
-  if (countable) require_budget(*this, p.bytes(request.storage), request);
-  const int limit = request.context.max_3d_texture_size;
-  if (std::max({texels.x, texels.y, texels.z}) > limit || !countable)
-    throw UnsupportedError(
-        fmt::format("encoding uniform: level {} has {} x {} x {} cells ({} bytes, {} x {} x {} texels), a 3D texture of this "
-                    "context at most {} along an axis",
-                    p.level, p.cells.x, p.cells.y, p.cells.z,
-                    countable ? std::to_string(p.bytes(request.storage)) : fmt::format("about {:.2g}", about), texels.x, texels.y,
-                    texels.z, limit));
-  if (p.validity && 4 * p.validity_words() > request.context.max_buffer_bytes)
-    throw UnsupportedError(fmt::format("encoding uniform: validity bits take {} bytes, a buffer of this context at most {}",
-                                       4 * p.validity_words(), request.context.max_buffer_bytes));
+  require_countable(request, p);
   return p;
 }
 
-/// What the blocks are written to.
-struct Storages {
-  std::vector<HostTexture> values;  ///< one a field
-  HostTexture validity;             ///< without data where every cell has a value
-  HostTexture ranges;               ///< without data where no region is skipped
-  MoreRanges more_ranges;
-};
+void Uniform::require_countable(const BuildRequest& request, const Plan& p) const {
+  const Vec3d texels(p.texels().size());
+  const double bytes = p.fields * texels.x * texels.y * texels.z * texel_bytes(request.storage);
+  if (bytes < 0x1p60) return;
+  throw UnsupportedError(
+      fmt::format("encoding uniform: level {} has {} x {} x {} cells (about {:.2g} bytes), a 3D texture of this context at most "
+                  "{} along an axis; a coarser level has fewer",
+                  p.level, p.cells.x, p.cells.y, p.cells.z, bytes, request.context.max_3d_texture_size));
+}
+
+Layout Uniform::layout(const BuildRequest& request, const Plan& p) const {
+  Layout layout(*this, request);
+  const Vec3i texels = p.texels().size();
+  for (int number = 0; number < p.fields; ++number) {
+    Part values = layout.values("tex_dense", number, texels);
+    values.roles = {{.payload = p.cell_count(), .duplicated = values.texels() - p.cell_count()}};
+    layout.add(std::move(values));
+  }
+  layout.add(buffer_part("dense_validity", "validity bits", TexelFormat::r32ui, p.validity_words())
+                 .when(p.validity, "every cell has a value", Need::validity));
+  if (p.may_border && p.border == 0)
+    layout.leave_out({"border layer", "outside the domain lie the cells at its faces",
+                      layout.value_bytes(p.texels().grown(1).cells() - p.texels().cells()), Need::border});
+  const bool boxes = request.needs.draw_boxes;
+  layout.add(buffer_part("dense_ranges", "value ranges", TexelFormat::r32ui, p.block_count())
+                 .when(request.needs.value_ranges, boxes ? "the domain is drawn as one box" : "no region is skipped",
+                       boxes ? Need::none : Need::value_ranges));
+  layout.add(layout.more_ranges("dense_more_ranges", p.block_count()));
+  if (p.validity) layout.add_working(p.fields * p.cell_count());  // Writer's
+  layout.set_remedy(fmt::format("; level {} has {} x {} x {} cells", p.level, p.cells.x, p.cells.y, p.cells.z));
+  return layout;
+}
 
 /// Writes the blocks of the structure: values, which cells are missing, ranges.
 class Writer {
  public:
-  Writer(const AmrHierarchy& h, const BuildRequest& request, const Plan& plan, const EncodedField& field, Storages& out)
-      : hierarchy_(h), request_(request), plan_(plan), field_(field), out_(out) {
+  /// `field`: with its parts, which are written.
+  Writer(const AmrHierarchy& h, const BuildRequest& request, const Plan& plan, EncodedField& field)
+      : hierarchy_(h),
+        request_(request),
+        plan_(plan),
+        field_(field),
+        validity_(field.find("dense_validity")),
+        ranges_(field.find("dense_ranges")),
+        more_ranges_(field, "dense_more_ranges") {
+    for (int number = 0; number < plan.fields; ++number) values_.push_back(field.find(element_name("tex_dense", number)));
     if (plan.validity) missing_.resize(static_cast<std::size_t>(plan.fields * plan.cell_count()));
   }
 
   void block(const Vec3i& b) {
     bool mesh = false;
     std::uint32_t range = kVacantRange;
+    const auto index = static_cast<std::int64_t>(Box{Vec3i(0), plan_.blocks}.offset(b));
     for (int number = 0; number < plan_.fields; ++number) {
       const Contents contents = write_values(b, number);
       mesh = mesh || contents.any;
       if (number == 0 && contents.any) range = encode_range(contents.range, field_.range_origin, request_.storage, field_.scale);
-      out_.more_ranges.set(field_, Box{Vec3i(0), plan_.blocks}.offset(b), number, contents.any ? contents.range : ValueRange{});
+      more_ranges_.set(index, number, contents.any ? contents.range : ValueRange{});
     }
-    if (plan_.ranges) out_.ranges.as<std::uint32_t>()[Box{Vec3i(0), plan_.blocks}.offset(b)] = mesh ? range : kNoRange;
+    if (ranges_ != nullptr) ranges_->as<std::uint32_t>()[index] = mesh ? range : kNoRange;
   }
 
   /// When all blocks are written: one bit for each of their bytes, which threads do not share.
   void write_validity() const {
     if (missing_.empty()) return;
     const std::uint8_t* missing = missing_.data();
-    std::uint32_t* words = out_.validity.as<std::uint32_t>();
+    std::uint32_t* words = validity_->as<std::uint32_t>();
     for (int number = 0; number < plan_.fields; ++number) {
       for (std::int64_t i = 0; i < plan_.cell_count(); ++i)
         if (missing[i] == 0) set_bit(words, i);
@@ -144,7 +158,6 @@ class Writer {
       words += words_for_bits(plan_.cell_count());
     }
   }
-  std::int64_t host_bytes() const { return static_cast<std::int64_t>(missing_.size()); }
 
  private:
   struct Contents {
@@ -210,7 +223,7 @@ class Writer {
       if (own.lower[a] == all.lower[a]) own.lower[a] = texels.lower[a];
       if (own.upper[a] == all.upper[a]) own.upper[a] = texels.upper[a];
     }
-    HostTexture& texture = out_.values[static_cast<std::size_t>(number)];
+    HostTexture& texture = *values_[static_cast<std::size_t>(number)];
     const StorageScale scale = field_.scale_of(number);
     for (int z = own.lower.z; z < own.upper.z; ++z)
       for (int y = own.lower.y; y < own.upper.y; ++y)
@@ -222,23 +235,12 @@ class Writer {
   const BuildRequest& request_;
   const Plan& plan_;
   const EncodedField& field_;
-  Storages& out_;
+  std::vector<HostTexture*> values_;  ///< one a field
+  HostTexture* validity_;             ///< null where every cell has a value
+  HostTexture* ranges_;               ///< null where no region is skipped
+  MoreRanges more_ranges_;
   std::vector<std::uint8_t> missing_;  ///< a byte a cell of each field
 };
-
-Storages make_storages(const Encoding& encoding, const BuildRequest& request, const Plan& p, const EncodedField& field) {
-  Storages out{{}, {}, {}, MoreRanges(encoding, request, "dense_more_ranges", p.block_count())};
-  for (int number = 0; number < p.fields; ++number) {
-    HostTexture& t = out.values.emplace_back(make_texture(element_name("tex_dense", number), field.storage, p.texels().size()));
-    t.hardware_linear = field.filtering == Filtering::hardware;
-    t.holds_values = true;
-    t.roles.payload = p.cell_count() * texel_bytes(field.storage);
-    t.roles.duplicated = t.bytes() - t.roles.payload;
-  }
-  if (p.validity) out.validity = make_buffer("dense_validity", TexelFormat::r32ui, p.validity_words());
-  if (p.ranges) out.ranges = make_buffer("dense_ranges", TexelFormat::r32ui, p.block_count());
-  return out;
-}
 
 EncodedField Uniform::build(const AmrHierarchy& h, const BuildRequest& request) const {
   if (!request.needs.draw_boxes) return build_blocks(h, request);
@@ -257,6 +259,9 @@ EncodedField Uniform::build_blocks(const AmrHierarchy& h, const BuildRequest& re
   require_fields(*this, h, request);
   const Json parameters = complete_parameters(*this, request.parameters);
   const Plan p = plan(h, request, parameters);
+  const Layout parts = layout(request, p);
+  parts.require_budget();
+  parts.require_limits();
   EncodedField field = start_field(*this, h, request, parameters);
   field.build_parameters["level"] = p.level;
   field.definition.page_level = p.level;
@@ -265,8 +270,8 @@ EncodedField Uniform::build_blocks(const AmrHierarchy& h, const BuildRequest& re
   field.shader.defines.emplace_back("AMRTEX_DENSE_VERTICES", p.vertices ? 1 : 0);
   field.integer_uniforms = {{"u_dense_cells", p.cells}, {"u_dense_blocks", p.blocks}};
 
-  Storages out = make_storages(*this, request, p, field);
-  Writer writer(h, request, p, field, out);
+  parts.allocate(field);
+  Writer writer(h, request, p, field);
   tbb::parallel_for(std::int64_t{0}, p.block_count(), [&](std::int64_t i) {
     const auto x = static_cast<int>(i % p.blocks.x);
     const auto y = static_cast<int>(i / p.blocks.x % p.blocks.y);
@@ -274,24 +279,6 @@ EncodedField Uniform::build_blocks(const AmrHierarchy& h, const BuildRequest& re
     writer.block({x, y, z});
   });
   writer.write_validity();
-
-  field.host_peak_bytes = p.bytes(request.storage) + writer.host_bytes();
-  field.textures = std::move(out.values);
-  if (p.validity)
-    field.textures.push_back(std::move(out.validity));
-  else
-    field.left_out.push_back({"validity bits", "every cell has a value", 4 * p.validity_words(), Part::validity});
-  if (p.may_border && p.border == 0)
-    field.left_out.push_back({"border layer", "outside the domain lie the cells at its faces",
-                              p.fields * (p.texels().grown(1).cells() - p.texels().cells()) * texel_bytes(request.storage),
-                              Part::border});
-  if (p.ranges)
-    field.textures.push_back(std::move(out.ranges));
-  else
-    field.left_out.push_back({"value ranges",
-                              request.needs.draw_boxes ? "the domain is drawn as one box" : "no region is skipped",
-                              4 * p.block_count(), request.needs.draw_boxes ? Part::none : Part::value_ranges});
-  out.more_ranges.move_to(field);
   field.statistics = {{"blocks", p.block_count()}};
   return field;
 }

@@ -1,35 +1,42 @@
-// A dense grid over the domain: each cell knows the deepest node of the tree that holds it, so that descents are short.
+// A dense grid over the domain: each cell knows the deepest node of a tree that holds it, so that descents are short.
+//
+// A tree has `nodes`, a node its `first_child` (0: a leaf; the second child is the next node; both stand after it) and `axis`.
+// What else is asked of a node two functions beside its type tell:
+//
+//   int plane_of(const AmrHierarchy&, const Node&, const Box&)   where its plane lies, finest cells; the box is the node's
+//   bool is_drawn(const Node&)                                   may it be drawn itself? Then no grid starts below it
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
 #include <vector>
 
-#include "kd_partition.hpp"
+#include "structures/common/build_tools.hpp"
 
-namespace amrtex::kd {
+namespace amrtex {
 
 /// Boxes of all nodes, in finest cells, from the root's down.
-inline std::vector<Box> node_boxes(const AmrHierarchy& h, const Tree& tree) {
+template <class Tree>
+std::vector<Box> node_boxes(const AmrHierarchy& h, const Tree& tree) {
   std::vector<Box> boxes(tree.nodes.size());
   boxes[0] = h.domain(h.finest_level());
   for (std::size_t i = 0; i < tree.nodes.size(); ++i) {
-    const Node& n = tree.nodes[i];
+    const auto& n = tree.nodes[i];
     if (n.first_child == 0) continue;
-    const int plane = boxes[i].lower[n.axis] + n.split * h.cell_width(n.level);
-    boxes[n.first_child] = boxes[n.first_child + 1] = boxes[i];
-    boxes[n.first_child].upper[n.axis] = plane;
-    boxes[n.first_child + 1].lower[n.axis] = plane;
+    const auto child = static_cast<std::size_t>(n.first_child);
+    boxes[child] = boxes[child + 1] = boxes[i];
+    boxes[child].upper[n.axis] = boxes[child + 1].lower[n.axis] = plane_of(h, n, boxes[i]);
   }
   return boxes;
 }
 
 /// Splits from each node to the deepest leaf below it.
-inline std::vector<int> node_heights(const Tree& tree) {
+template <class Tree>
+std::vector<int> node_heights(const Tree& tree) {
   std::vector<int> heights(tree.nodes.size());
   for (std::size_t i = tree.nodes.size(); i-- > 0;) {
-    const Node& n = tree.nodes[i];
-    if (n.first_child != 0) heights[i] = 1 + std::max(heights[n.first_child], heights[n.first_child + 1]);
+    const auto child = static_cast<std::size_t>(tree.nodes[i].first_child);
+    if (child != 0) heights[i] = 1 + std::max(heights[child], heights[child + 1]);
   }
   return heights;
 }
@@ -43,6 +50,26 @@ struct StartGrid {
   std::int64_t leaf_cells = 0;         ///< cells of the grid that lie in one leaf: no descent at all
   std::int64_t bytes() const {
     return 4 * static_cast<std::int64_t>(entries.size()) + 32 * static_cast<std::int64_t>(nodes.size());
+  }
+
+  Part entries_part(std::string name) const {
+    return buffer_part(std::move(name), "entries of the start grid", TexelFormat::r32ui,
+                       static_cast<std::int64_t>(entries.size()));
+  }
+  /// Two times four words a node: write_box() of its box, with its index and its coded range.
+  Part nodes_part(std::string name) const {
+    return buffer_part(std::move(name), "nodes of the start grid", TexelFormat::rgba32ui,
+                       2 * static_cast<std::int64_t>(nodes.size()));
+  }
+  /// `range_of(node)`: its coded range; 0 where nobody asks for it.
+  template <class RangeOf>
+  void write(const std::vector<Box>& boxes, RangeOf&& range_of, HostTexture& entry_buffer, HostTexture& node_buffer) const {
+    std::copy(entries.begin(), entries.end(), entry_buffer.as<std::uint32_t>());
+    auto* words = node_buffer.as<std::uint32_t>();
+    for (const std::uint32_t node : nodes) {
+      write_box(boxes[node], node, range_of(node), words);
+      words += 8;
+    }
   }
 };
 
@@ -67,7 +94,8 @@ inline std::int64_t whole_cells(const Box& box, int width) {
 }
 
 /// The widest grid of which nearly all cells lie in one leaf, or the finest of at most `most_cells` cells.
-inline int choose_width(const AmrHierarchy& h, const Tree& tree, const std::vector<Box>& boxes, std::int64_t most_cells) {
+template <class Tree>
+int choose_width(const AmrHierarchy& h, const Tree& tree, const std::vector<Box>& boxes, std::int64_t most_cells) {
   const Vec3i domain = h.cells(h.finest_level());
   int chosen = 0;
   for (const int w : grid_widths(h)) {
@@ -83,10 +111,11 @@ inline int choose_width(const AmrHierarchy& h, const Tree& tree, const std::vect
 }
 
 /// The deepest node that holds all of a box of finest cells; with a level of detail, none below one that may be drawn itself.
-inline std::uint32_t deepest_holding(const Tree& tree, const std::vector<Box>& boxes, const Box& box) {
+template <class Tree>
+std::uint32_t deepest_holding(const Tree& tree, const std::vector<Box>& boxes, const Box& box) {
   std::uint32_t i = 0;
-  while (tree.nodes[i].first_child != 0 && tree.nodes[i].leaf < 0) {
-    const std::uint32_t child = tree.nodes[i].first_child;
+  while (tree.nodes[i].first_child != 0 && !is_drawn(tree.nodes[i])) {
+    const auto child = static_cast<std::uint32_t>(tree.nodes[i].first_child);
     if (boxes[child].contains(box))
       i = child;
     else if (boxes[child + 1].contains(box))
@@ -97,7 +126,8 @@ inline std::uint32_t deepest_holding(const Tree& tree, const std::vector<Box>& b
   return i;
 }
 
-inline StartGrid make_start_grid(const AmrHierarchy& h, const Tree& tree, std::int64_t most_cells) {
+template <class Tree>
+StartGrid make_start_grid(const AmrHierarchy& h, const Tree& tree, std::int64_t most_cells) {
   const std::vector<Box> boxes = node_boxes(h, tree);
   StartGrid grid;
   grid.width = choose_width(h, tree, boxes, most_cells);
@@ -119,4 +149,4 @@ inline StartGrid make_start_grid(const AmrHierarchy& h, const Tree& tree, std::i
   return grid;
 }
 
-}  // namespace amrtex::kd
+}  // namespace amrtex

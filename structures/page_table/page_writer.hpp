@@ -1,0 +1,133 @@
+// Writes stored pages and the table.
+#pragma once
+
+#include <tbb/parallel_for.h>
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "page_partition.hpp"
+#include "page_reader.hpp"
+#include "structures/common/build_tools.hpp"
+
+namespace amrtex::pages {
+
+inline void write_page(const Options& o, const PoolLayout& pool, std::int64_t index, Storage storage, StorageScale scale,
+                       std::span<const double> values, HostTexture& texture) {
+  const Vec3i at = pool.position(index);
+  const Box all{Vec3i(0), texture.size};
+  const auto edge = static_cast<std::size_t>(o.edge);
+  for (int z = 0; z < o.edge; ++z)
+    for (int y = 0; y < o.edge; ++y)
+      store_values(storage, scale, &values[edge * (static_cast<std::size_t>(y) + edge * static_cast<std::size_t>(z))], edge,
+                   texture.data.data(), all.offset(at + Vec3i(0, y, z)));
+}
+
+/// Writes stored pages: values, validity bits and coded ranges.
+class PageWriter {
+ public:
+  /// `field`: with its parts, which are written.
+  PageWriter(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const PoolLayout& pool, EncodedField& field)
+      : request_(request),
+        options_(o),
+        pool_(pool),
+        field_(field),
+        reader_(h, o),
+        validity_(field.find("page_validity")),
+        more_ranges_(field, "page_more_ranges") {
+    // node-centred pages lie side by side without a border
+    const bool leaks = field.filtering == Filtering::hardware && o.nodes;
+    for (int number = 0; number < field.field_count; ++number) {
+      pools_.push_back(field.find(element_name("tex_pages", number)));
+      leak_.push_back(leaks ? leaked_value(h.statistics(request.field_at(number)), pool.texels()) : 0);
+    }
+  }
+
+  void write(Page& page) {
+    for (int number = 0; number < field_.field_count; ++number) {
+      const PageContents contents = reader_.read(page, request_.field_at(number));
+      write_page(options_, pool_, page.index, request_.storage, field_.scale_of(number), reader_.values(),
+                 *pools_[static_cast<std::size_t>(number)]);
+      if (validity_ != nullptr) reader_.write_validity(page, validity_words(page, number));
+      if (number == 0 && request_.needs.value_ranges) page.green = coded_range(contents);
+      more_ranges_.set(page.index, number, range_of(contents, number));
+    }
+  }
+
+ private:
+  /// A page's words of all fields stand side by side.
+  std::uint32_t* validity_words(const Page& page, int number) {
+    return validity_->as<std::uint32_t>() + (page.index * field_.field_count + number) * options_.page_words();
+  }
+  /// Of what a field can return in a page; empty where it has no value.
+  ValueRange range_of(const PageContents& c, int number) const {
+    const double leak = leak_[static_cast<std::size_t>(number)];
+    return c.any ? ValueRange{c.range.min - leak, c.range.max + leak} : ValueRange{};
+  }
+  std::uint32_t coded_range(const PageContents& c) const { return encode_range(field_, 0, range_of(c, 0)); }
+
+  const BuildRequest& request_;
+  const Options& options_;
+  const PoolLayout& pool_;
+  const EncodedField& field_;
+  PageReader reader_;
+  std::vector<HostTexture*> pools_;  ///< one a field, all laid out in the same way
+  HostTexture* validity_;            ///< null where every cell has a value
+  MoreRanges more_ranges_;
+  std::vector<double> leak_;  ///< of each field
+};
+
+/// Reads the stored pages once more, to store them.
+inline void store_pages(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const PoolLayout& pool,
+                        std::vector<Page>& pages, EncodedField& field) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pages.size(), 8), [&](const auto& range) {
+    PageWriter writer(h, request, o, pool, field);
+    for (std::size_t i = range.begin(); i != range.end(); ++i)
+      if (pages[i].kind == AMRTEX_PAGE_STORED) writer.write(pages[i]);
+  });
+}
+
+struct Entry {
+  std::uint32_t red = 0;
+  std::uint32_t green = 0;
+};
+
+inline void write_entry(HostTexture& texture, const Vec3i& texel, const Entry& entry) {
+  const std::size_t i = Box{Vec3i(0), texture.size}.offset(texel);
+  if (texture.format == TexelFormat::r32ui)
+    texture.as<std::uint32_t>()[i] = entry.red;
+  else
+    texture.as<Entry>()[i] = entry;
+}
+
+/// Writes the entries of one page into `table`, the box of entries (pages of `table_level`)
+/// that stand in the texture from texel `at`.
+inline void write_entries(const AmrHierarchy& h, const Page& page, int table_level, const Box& table, HostTexture& texture,
+                          const Vec3i& at) {
+  const int r = h.cell_width(page.level) / h.cell_width(table_level);
+  const Entry entry{red_of(page.kind, page.level, page.index), page.green};
+  for_each_cell(intersection(Box{page.index_in_level, page.index_in_level + Vec3i(1)}.refined(r), table),
+                [&](const Vec3i& i) { write_entry(texture, i - table.lower + at, entry); });
+}
+
+inline void write_table(const AmrHierarchy& h, const TablePlan& plan, const std::vector<Page>& pages, EncodedField& field) {
+  HostTexture& top = *field.find("tex_page_table");
+  HostTexture* lower = field.find("tex_page_subtables");
+  const Box top_box{Vec3i(0), plan.top};
+  std::map<std::size_t, std::uint32_t> subtables;  // by the entry that points to it
+  for (const Page& page : pages) {
+    if (page.level <= plan.top_level) {
+      write_entries(h, page, plan.top_level, top_box, top, Vec3i(0));
+      continue;
+    }
+    const Vec3i owner = page.index_in_level / (h.cell_width(plan.top_level) / h.cell_width(page.level));
+    const auto [sub, added] = subtables.try_emplace(top_box.offset(owner), static_cast<std::uint32_t>(subtables.size()));
+    if (added) write_entry(top, owner, {red_of(AMRTEX_PAGE_SUBTABLE, 0, sub->second), 0});
+    const Box entries = Box{owner, owner + Vec3i(1)}.refined(plan.sub_edge);
+    write_entries(h, page, plan.finest_level, entries, *lower, plan.sub_layout.position(sub->second));
+  }
+}
+
+}  // namespace amrtex::pages
