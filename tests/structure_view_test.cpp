@@ -14,6 +14,9 @@ namespace {
 using testing::Each;
 using testing::HasSubstr;
 
+/// Places are what these tests look at.
+const FieldValues kOnes = [](const FinestPosition&, int) { return 1.0; };
+
 AmrHierarchy small_mesh() {
   return AmrHierarchy(
       generate_mesh({{"field", {{"type", "shell"}, {"center", {0.1, 0.1, 0.25}}, {"radius", 0.62}, {"width", 0.07}}},
@@ -72,7 +75,7 @@ TEST(StructureView, LatticeSamplesLieInTheMiddlesOfEqualIntervals) {
   const double cell = mesh.spacing(mesh.finest_level()).x;
   const WorldRay ray{{-1, 0.51, 0.26}, {1, 0, 0}};
   const std::vector<SamplePlace> places =
-      list_samples(mesh, built(mesh, "kd_tree", Filter::linear_lod), 0, ray, Sampling::lattice, 2);
+      list_samples(mesh, built(mesh, "kd_tree", Filter::linear_lod), kOnes, ray, Sampling::lattice, 2);
   ASSERT_EQ(places.size(), 16U);  // 32 finest cells
   for (std::size_t i = 0; i < places.size(); ++i) {
     EXPECT_NEAR(places[i].position.x, (2 * static_cast<double>(i) + 1) * cell, cell / 2048);
@@ -85,7 +88,7 @@ TEST(StructureView, AdaptiveSamplesDivideEachRegionIntoEqualIntervals) {
   const AmrHierarchy mesh = small_mesh();
   const EncodedField field = built(mesh, "octree", Filter::nearest);
   const WorldRay ray{{-1, 0.51, 0.26}, {1, 0, 0}};
-  const std::vector<SamplePlace> places = list_samples(mesh, field, 0, ray, Sampling::adaptive, 0.5);
+  const std::vector<SamplePlace> places = list_samples(mesh, field, kOnes, ray, Sampling::adaptive, 0.5);
   const double cell = mesh.spacing(mesh.finest_level()).x;
   std::size_t next = 0;
   for (const FieldRegion& r : list_regions(mesh, field)) {
@@ -106,7 +109,7 @@ TEST(StructureView, AdaptiveSamplesDivideEachRegionIntoEqualIntervals) {
 TEST(StructureView, ARayBesideTheDomainHasNoSamples) {
   const AmrHierarchy mesh = small_mesh();
   const EncodedField field = built(mesh, "uniform", Filter::nearest);
-  EXPECT_TRUE(list_samples(mesh, field, 0, {{-1, 3, 0.2}, {1, 0, 0}}, Sampling::lattice, 1).empty());
+  EXPECT_TRUE(list_samples(mesh, field, kOnes, {{-1, 3, 0.2}, {1, 0, 0}}, Sampling::lattice, 1).empty());
 }
 
 }  // namespace

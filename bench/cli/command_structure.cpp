@@ -6,6 +6,7 @@
 
 #include "bench/cli/commands.hpp"
 #include "renderers/cpu/structure_view.hpp"
+#include "renderers/reference/hierarchy_reference.hpp"
 #include "structures/mesh/error.hpp"
 #include "structures/readers/mesh_io.hpp"
 
@@ -51,7 +52,11 @@ Shown build(const Arguments& a) {
   EncodedField field = encoding.build(mesh, request);
   std::vector<FieldRegion> regions = list_regions(mesh, field);
   std::optional<std::vector<SamplePlace>> samples;
-  if (!a.ray.empty()) samples = list_samples(mesh, field, request.field, parse_ray(a.ray), sampling, a.step);
+  if (!a.ray.empty()) {
+    const HierarchyReference reference(mesh, request.field, field.definition);
+    const FieldValues values = [&](const FinestPosition& p, int) { return reference.sample(p); };
+    samples = list_samples(mesh, field, values, parse_ray(a.ray), sampling, a.step);
+  }
   return {std::move(mesh), std::move(field), std::move(regions), std::move(samples)};
 }
 

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "renderers/cpu/sampled_reference.hpp"
 #include "renderers/bindings/scene_bindings.hpp"
 #include "structures/mesh/error.hpp"
 
@@ -33,8 +32,8 @@ Scene scene_of(const WorldRay& ray, Sampling sampling, double step) {
 
 }  // namespace
 
-std::vector<FieldRegion> list_regions(const AmrHierarchy& hierarchy, const EncodedField& field) {
-  const Box domain = hierarchy.domain(hierarchy.finest_level());
+std::vector<FieldRegion> list_regions(const DomainGeometry& geometry, const EncodedField& field) {
+  const Box domain{Vec3i(0), geometry.cells};
   if (domain.cells() > kMostListedCells)
     throw UnsupportedError(
         fmt::format("regions of {}: the domain has {} cells of the finest level; listed are those of at most {}", field.encoding,
@@ -42,7 +41,7 @@ std::vector<FieldRegion> list_regions(const AmrHierarchy& hierarchy, const Encod
   const auto cpu = make_cpu_field(field.encoding, Precision::double_precision);
   std::vector<const HostTexture*> textures;
   for (const HostTexture& t : field.textures) textures.push_back(&t);
-  cpu->set(field.shader.defines, field_uniforms(hierarchy, field), textures);
+  cpu->set(field.shader.defines, field_uniforms(geometry, field), textures);
   std::vector<FieldRegion> regions;
   std::vector<bool> seen(static_cast<std::size_t>(domain.cells()));
   for_each_cell(domain, [&](const Vec3i& cell) {
@@ -53,16 +52,14 @@ std::vector<FieldRegion> list_regions(const AmrHierarchy& hierarchy, const Encod
   return regions;
 }
 
-std::vector<SamplePlace> list_samples(const AmrHierarchy& hierarchy, const EncodedField& field, int mesh_field,
+std::vector<SamplePlace> list_samples(const DomainGeometry& geometry, const EncodedField& field, const FieldValues& values,
                                       const WorldRay& ray, Sampling sampling, double step) {
-  const HierarchyReference reference(hierarchy, mesh_field, field.definition);
-  const Vec3d cell = hierarchy.spacing(hierarchy.finest_level());
   std::vector<SamplePlace> places;  // one pixel, so one thread
-  const FieldValues note = [&](const FinestPosition& p, int) {
-    places.push_back({hierarchy.domain_lower() + (Vec3d(p.cell) + p.fraction) * cell, reference.sample(p)});
+  const FieldValues note = [&](const FinestPosition& p, int number) {
+    places.push_back({geometry.lower + (Vec3d(p.cell) + p.fraction) * geometry.spacing, values(p, number)});
     return places.back().value;
   };
-  render_sampled(hierarchy, field, scene_of(ray, sampling, step), note);
+  render_sampled(geometry, field, scene_of(ray, sampling, step), note);
   return places;
 }
 
