@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "structures/mesh/error.hpp"
 #include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
