@@ -233,8 +233,8 @@ def filters(program):
     svg.text(570, bottom + 18, "x, in cells of level 0", 12, INK, "middle")
     svg.text(14, bottom + 40, "Bars: leaf cells along the line and their values; level 0 grey, level 1 (four times as fine) "
              "orange. Line: f(x) of the double reference.", 12, FAINT)
-    svg.text(14, bottom + 57, "Dashes: ends of pages of 4³ cells. A page with an orange cell in it has level 1; there a grey cell's "
-             "value stands still.", 12, FAINT)
+    svg.text(14, bottom + 57, "Dashes: ends of pages of 4³ cells. A page with an orange cell in it has level 1; "
+             "there a grey cell's value stands still.", 12, FAINT)
     return svg
 
 
@@ -319,7 +319,8 @@ BOXES = {  # name: left, top, width, lines; the first is bold
 }
 ARROWS = [("file", "mesh", "read"), ("mesh", "field", "build"), ("field", "gpu", "upload"), ("field", "cpu", ""),
           ("gpu", "picture", "draw"), ("mesh", "reference", ""), ("reference", "truth", "integrate"),
-          ("truth", "record", "compare"), ("picture", "record", "measure"), ("cpu", "record", "error by cause"), ("record", "table", "report")]
+          ("truth", "record", "compare"), ("picture", "record", "measure"), ("cpu", "record", "error by cause"),
+          ("record", "table", "report")]
 MOVED = {"upload": (-24, 0), "compare": (30, 14)}  # labels, from beside the arrow's middle
 BOX_HEIGHT = 52
 
@@ -409,7 +410,8 @@ def fastest_table(least_db=50.0):
         time, _, r = min(reached, key=lambda p: p[0])
         size = r["encoding"].partition("page_size ")[2].partition(",")[0]
         shown = f"`{name}`" + (f", pages of {size}³" if size else "")
-        cells = [shown, f"`{r['filter']}`", r["storage"], f"{float(r['step']):g}", f"{float(r['total']):.1f}", f"{time:.1f}", f"{float(r['psnr_common']):.1f}"]
+        cells = [shown, f"`{r['filter']}`", r["storage"], f"{float(r['step']):g}",
+                 f"{float(r['total']):.1f}", f"{time:.1f}", f"{float(r['psnr_common']):.1f}"]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
