@@ -35,6 +35,22 @@ std::vector<Vec3d> read_points(const std::string& path) {
   return points;
 }
 
+}  // namespace
+
+Json parse_parameters(const std::vector<std::string>& given) {
+  Json parameters = Json::object();
+  for (const std::string& p : given) {
+    const auto equals = p.find('=');
+    if (equals == std::string::npos) throw UsageError(fmt::format("--parameter {}: accepted: NAME=VALUE, as in page_size=8", p));
+    const std::string value = p.substr(equals + 1);
+    const Json json = Json::parse(value, nullptr, false);
+    parameters[p.substr(0, equals)] = json.is_discarded() ? Json(value) : json;
+  }
+  return parameters;
+}
+
+namespace {
+
 struct Sampled {
   Vec3d p;
   int level = -1;
@@ -109,18 +125,6 @@ int run(const Arguments& a) {
 }
 
 }  // namespace
-
-Json parse_parameters(const std::vector<std::string>& given) {
-  Json parameters = Json::object();
-  for (const std::string& p : given) {
-    const auto equals = p.find('=');
-    if (equals == std::string::npos) throw UsageError(fmt::format("--parameter {}: accepted: NAME=VALUE, as in page_size=8", p));
-    const std::string value = p.substr(equals + 1);
-    const Json json = Json::parse(value, nullptr, false);
-    parameters[p.substr(0, equals)] = json.is_discarded() ? Json(value) : json;
-  }
-  return parameters;
-}
 
 void add_sample_command(CLI::App& app, Command& chosen) {
   auto a = std::make_shared<Arguments>();
