@@ -36,8 +36,10 @@ JUMP_MESH = {"field": {"type": "shell", "center": [-20, 2, 2], "radius": 26.95, 
 STORED = [("uniform", "linear_page", []), ("page_table", "linear_page", ["page_size=4"]), ("octree", "linear_lod", []),
           ("kd_tree", "linear_lod", []), ("exabricks", "basis", [])]
 # Each filter, through an encoding that has it, and what it does at a level jump.
-FILTERS = [("nearest", "uniform", [], "jumps at every face"), ("linear_lod", "octree", [], "jumps where cells change level"),
-           ("linear_page", "page_table", ["page_size=4"], "jumps where pages change level"), ("linear_vertex", "uniform", [], "continuous"),
+FILTERS = [("nearest", "uniform", [], "jumps at every face"),
+           ("linear_lod", "octree", [], "jumps where cells change level"),
+           ("linear_page", "page_table", ["page_size=4"], "jumps where pages change level"),
+           ("linear_vertex", "uniform", [], "continuous"),
            ("basis", "kd_tree", [], "continuous")]
 
 
@@ -59,16 +61,18 @@ class Program:
             self.run("generate", json.dumps(specification), "-o", str(folder))
         return str(folder)
 
-    def structure(self, mesh, encoding, filter_name, parameters, *options):
+    def about(self, command, mesh, encoding, filter_name, parameters, *options):
         chosen = [word for p in parameters for word in ("--parameter", p)]
-        return json.loads(self.run("structure", mesh, "--encoding", encoding, "--filter", filter_name, *chosen, "--json", *options))
+        return json.loads(self.run(command, mesh, "--encoding", encoding, "--filter", filter_name, *chosen, "--json", *options))
+
+    def structure(self, *encoding_and_options):
+        return self.about("structure", *encoding_and_options)
 
     def sample(self, mesh, encoding, filter_name, parameters, points):
         """The double reference at points."""
         file = self.folder / "points.txt"
         file.write_text("".join("%.17g %.17g %.17g\n" % p for p in points))
-        chosen = [word for p in parameters for word in ("--parameter", p)]
-        rows = json.loads(self.run("sample", mesh, "--encoding", encoding, "--filter", filter_name, *chosen, "--points", str(file), "--json"))
+        rows = self.about("sample", mesh, encoding, filter_name, parameters, "--points", str(file))
         return [row["reference"] for row in rows]
 
 
@@ -96,7 +100,7 @@ def draw_boxes(svg, left, top, finest, boxes, edge):
 
 
 def leaf_rows(structure):
-    """Values of the slice, one a finest cell, the top row first: those of `uniform` under `nearest`, whose texture is the domain."""
+    """Values of the slice, one a finest cell, the top row first: of `uniform` under `nearest`, whose texture is the domain."""
     values = next(t["values"] for t in structure["textures"] if t["holds_values"])
     nx, ny, _ = structure["finest_cells"]
     z = middle(structure["finest_cells"])
@@ -159,7 +163,8 @@ def draw_structure(svg, left, top, structure, low, high):
     svg.text(left, below, "1 region" if len(structure["regions"]) == 1 else f"{len(structure['regions'])} regions", 11)
     roles = structure["memory"]
     svg.text(right, below, kibibytes(sum(roles.values())), 11, INK, weight="bold")
-    svg.text(left, below + 14, ", ".join(f"{role} {count / 1024:.1f}" for role, count in roles.items() if count >= 52) + " KiB", 11, FAINT)
+    told = [f"{role} {count / 1024:.1f}" for role, count in roles.items() if count >= 52]  # what is not 0.0
+    svg.text(left, below + 14, ", ".join(told) + " KiB", 11, FAINT)
 
 
 def draw_mesh(svg, left, top, mesh, low, high):
@@ -185,8 +190,8 @@ def structures(program):
     draw_mesh(svg, 14, 10, cells, low, high)
     for i, stored in enumerate(STORED, start=1):
         draw_structure(svg, 14 + (i % 2) * column, 10 + (i // 2) * row, program.structure(mesh, *stored, "--texels"), low, high)
-    svg.text(14, 3 * row + 12, "Left: regions in the slice, in the colour of their level. Right: every texel of the value texture, layer by layer, "
-             "at one scale: area is memory.", 12, INK)
+    svg.text(14, 3 * row + 12, "Left: regions in the slice, in the colour of their level. Right: every texel of the value "
+             "texture, layer by layer, at one scale: area is memory.", 12, INK)
     return svg
 
 
@@ -226,9 +231,10 @@ def filters(program):
     for x in range(length + 1):
         svg.text(axes.x(x), bottom, str(x), 11, FAINT, "middle")
     svg.text(570, bottom + 18, "x, in cells of level 0", 12, INK, "middle")
-    svg.text(14, bottom + 40, "Bars: leaf cells along the line and their values; level 0 grey, level 1 (four times as fine) orange. Line: f(x) of the double "
-             "reference.", 12, FAINT)
-    svg.text(14, bottom + 57, "Dashes: ends of pages of 4³ cells. A page with an orange cell in it has level 1; there a grey cell's value stands still.", 12, FAINT)
+    svg.text(14, bottom + 40, "Bars: leaf cells along the line and their values; level 0 grey, level 1 (four times as fine) "
+             "orange. Line: f(x) of the double reference.", 12, FAINT)
+    svg.text(14, bottom + 57, "Dashes: ends of pages of 4³ cells. A page with an orange cell in it has level 1; "
+             "there a grey cell's value stands still.", 12, FAINT)
     return svg
 
 
@@ -279,10 +285,10 @@ def sampling(program):
         svg.line(*clipped(at, RAY_FROM, RAY_TO), INK, 1)
         for sample in shown["samples"]:
             svg.circle(*at(sample["p"]), 3.2, "#1f4e9c", "#ffffff", 0.8)
-    svg.text(14, edge + 58, f"The same kD-tree and ray, step {SHOWN_STEP}. lattice: a sample each {SHOWN_STEP} cells of the finest level, wherever regions begin and end.",
-             12, FAINT)
-    svg.text(14, edge + 76, f"adaptive: each region is divided into equal intervals of at most {SHOWN_STEP} of its own cells, sampled at their middles. "
-             "Colours: level 0 grey, 1 orange, 2 red.", 12, FAINT)
+    svg.text(14, edge + 58, f"The same kD-tree and ray, step {SHOWN_STEP}. lattice: a sample each {SHOWN_STEP} cells of the "
+             "finest level, wherever regions begin and end.", 12, FAINT)
+    svg.text(14, edge + 76, f"adaptive: each region is divided into equal intervals of at most {SHOWN_STEP} of its own cells, "
+             "sampled at their middles. Colours: level 0 grey, 1 orange, 2 red.", 12, FAINT)
     return svg
 
 
@@ -311,10 +317,11 @@ BOXES = {  # name: left, top, width, lines; the first is bold
     "record": (796, 116, 150, ["record", "memory, time, error"]),
     "table": (796, 226, 150, ["tables, diagrams", ""]),
 }
-ARROWS = [("file", "mesh", "read", (0, 0)), ("mesh", "field", "build", (0, 0)), ("field", "gpu", "upload", (-24, 0)), ("field", "cpu", "", (0, 0)),
-          ("gpu", "picture", "draw", (0, 0)), ("mesh", "reference", "", (0, 0)), ("reference", "truth", "integrate", (0, 0)),
-          ("truth", "record", "compare", (30, 14)), ("picture", "record", "measure", (0, 0)), ("cpu", "record", "error by cause", (0, 0)),
-          ("record", "table", "report", (0, 0))]
+ARROWS = [("file", "mesh", "read"), ("mesh", "field", "build"), ("field", "gpu", "upload"), ("field", "cpu", ""),
+          ("gpu", "picture", "draw"), ("mesh", "reference", ""), ("reference", "truth", "integrate"),
+          ("truth", "record", "compare"), ("picture", "record", "measure"), ("cpu", "record", "error by cause"),
+          ("record", "table", "report")]
+MOVED = {"upload": (-24, 0), "compare": (30, 14)}  # labels, from beside the arrow's middle
 BOX_HEIGHT = 52
 
 
@@ -322,8 +329,8 @@ def data_flow(_program):
     svg = Svg(960, 322, "From mesh to report")
     svg.rect(252, 214, 456, 76, "#eef4ec", "none", rx=8)
     svg.text(264, 308, "shares no code with encodings and shaders", 11, FAINT)
-    for start, end, label, moved in ARROWS:
-        draw_arrow(svg, BOXES[start], BOXES[end], label, moved)
+    for start, end, label in ARROWS:
+        draw_arrow(svg, BOXES[start], BOXES[end], label)
     for left, top, width, lines in BOXES.values():
         svg.rect(left, top, width, BOX_HEIGHT, "#f3f6fb", "#7d8ba3", 1.2, 6)
         svg.text(left + width / 2, top + (22 if lines[1] else 31), lines[0], 13, INK, "middle", "bold")
@@ -331,8 +338,9 @@ def data_flow(_program):
     return svg
 
 
-def draw_arrow(svg, a, b, label, moved):
-    """Sideways where b lies to the right of a, else down. `moved`: the label, from beside the arrow's middle."""
+def draw_arrow(svg, a, b, label):
+    """Sideways where b lies to the right of a, else down."""
+    moved = MOVED.get(label, (0, 0))
     if b[0] >= a[0] + a[2]:
         start, end = (a[0] + a[2], a[1] + BOX_HEIGHT / 2), (b[0] - 2, b[1] + BOX_HEIGHT / 2)
         place, anchor = ((start[0] + end[0]) / 2, (start[1] + end[1]) / 2 - 7), "middle"
@@ -395,14 +403,16 @@ def work_precision(_program):
 
 def fastest_table(least_db=50.0):
     """Markdown: of each encoding the fastest setting that reaches `least_db`."""
-    lines = ["| encoding | filter | storage | step (cells) | memory (MiB) | frame (ms) | PSNR (dB) |", "|---|---|---|---:|---:|---:|---:|"]
+    lines = ["| encoding | filter | storage | step (cells) | memory (MiB) | frame (ms) | PSNR (dB) |",
+             "|---|---|---|---:|---:|---:|---:|"]
     for name in COLOUR:
         reached = [p for p in settings() if name_of(p[2]) == name and float(p[2]["psnr_common"]) >= least_db]
         time, _, r = min(reached, key=lambda p: p[0])
         size = r["encoding"].partition("page_size ")[2].partition(",")[0]
         shown = f"`{name}`" + (f", pages of {size}³" if size else "")
-        lines.append(f"| {shown} | `{r['filter']}` | {r['storage']} | {float(r['step']):g} | {float(r['total']):.1f} | {time:.1f} "
-                     f"| {float(r['psnr_common']):.1f} |")
+        cells = [shown, f"`{r['filter']}`", r["storage"], f"{float(r['step']):g}",
+                 f"{float(r['total']):.1f}", f"{time:.1f}", f"{float(r['psnr_common']):.1f}"]
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
 

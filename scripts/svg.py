@@ -16,8 +16,8 @@ class Svg:
     def __init__(self, width, height, title):
         self.width, self.height = width, height
         self.parts = [
-            f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" width="{width}" height="{height}" '
-            f'viewBox="0 0 {width} {height}" font-family="{FONT}">',
+            '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
+            f'width="{width}" height="{height}" viewBox="0 0 {width} {height}" font-family="{FONT}">',
             f"<title>{escape(title)}</title>",
             f'<rect width="{width}" height="{height}" fill="#ffffff"/>',
         ]
@@ -42,11 +42,13 @@ class Svg:
     def polyline(self, points, stroke=INK, width=1.5, dash=None):
         extra = f' stroke-dasharray="{dash}"' if dash else ""
         self.parts.append(
-            f'<polyline points="{_points(points)}" fill="none" stroke="{stroke}" stroke-width="{width:g}" stroke-linejoin="round"{extra}/>')
+            f'<polyline points="{_points(points)}" fill="none" stroke="{stroke}" stroke-width="{width:g}" '
+            f'stroke-linejoin="round"{extra}/>')
 
     def circle(self, x, y, r, fill=INK, stroke="none", width=1.0, opacity=1.0):
-        self.parts.append(f'<circle cx="{x:.2f}" cy="{y:.2f}" r="{r:g}" fill="{fill}" fill-opacity="{opacity:g}" stroke="{stroke}" '
-                          f'stroke-width="{width:g}"/>')
+        self.parts.append(
+            f'<circle cx="{x:.2f}" cy="{y:.2f}" r="{r:g}" fill="{fill}" fill-opacity="{opacity:g}" stroke="{stroke}" '
+            f'stroke-width="{width:g}"/>')
 
     def text(self, x, y, text, size=12, fill=INK, anchor="start", weight="normal", turn=0):
         turned = f' transform="rotate({turn} {x:.2f} {y:.2f})"' if turn else ""

@@ -10,7 +10,6 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-SCRIPTS = ROOT / "scripts"
 PROGRAM = sys.argv.pop(1) if len(sys.argv) > 1 else str(ROOT / "build/release/amrtex")
 # `filters` needs a GL context, which not every machine has; the others are drawn from files and the CPU alone.
 CHEAP_FIGURES = ["structures", "sampling", "data_flow", "work_precision"]
@@ -21,16 +20,16 @@ ELSEWHERE = re.compile(r"[a-z]+:")  # http:, https:, mailto:
 
 def pages():
     """Markdown files of the project: tracked ones, or all where there is no repository."""
-    listed = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard", "*.md"], cwd=ROOT, capture_output=True, text=True)
+    command = ["git", "ls-files", "--cached", "--others", "--exclude-standard", "*.md"]
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     if listed.returncode == 0:
         return [ROOT / name for name in sorted(listed.stdout.split("\n")) if name and (ROOT / name).exists()]
     return sorted(p for p in ROOT.rglob("*.md") if not {"build", "out"} & set(p.relative_to(ROOT).parts))
 
 
 def prose(page):
-    """The page without code: fenced blocks, and spans between backticks."""
-    text = re.sub(r"^( *)```.*?^\1```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
-    return text
+    """The page without its fenced blocks of code."""
+    return re.sub(r"^( *)```.*?^\1```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
 
 
 def anchors(page):
@@ -64,8 +63,9 @@ class Links(unittest.TestCase):
     def test_the_check_finds_what_is_broken(self):
         with tempfile.TemporaryDirectory(dir=ROOT) as folder:
             page = pathlib.Path(folder) / "page.md"
-            page.write_text("# One, `two`\n[a](#one-two) [b](#three) [c](no.md) `[d](code.md)`\n```\n[e](code.md)\n```\n", encoding="utf-8")
-            self.assertEqual([line.partition(": ")[2] for line in broken_links(page)], ["#three: no such heading", "no.md: no such file"])
+            page.write_text("# One, `two`\n[a](#one-two) [b](#three) [c](no.md) `[d](code.md)`\n```\n[e](code.md)\n```\n")
+            found = [line.partition(": ")[2] for line in broken_links(page)]
+            self.assertEqual(found, ["#three: no such heading", "no.md: no such file"])
 
     def test_every_page_of_docs_is_listed(self):
         index = (ROOT / "docs/README.md").read_text(encoding="utf-8")
@@ -74,11 +74,15 @@ class Links(unittest.TestCase):
                 self.assertIn(f"({page.name})", index)
 
 
+def draw(*arguments):
+    command = [sys.executable, "-B", str(ROOT / "scripts/draw_figures.py"), *arguments]
+    return subprocess.run(command, capture_output=True, text=True)
+
+
 class Figures(unittest.TestCase):
     def test_figures_are_what_the_program_draws_today(self):
         with tempfile.TemporaryDirectory() as folder:
-            command = [sys.executable, "-B", str(SCRIPTS / "draw_figures.py"), "--program", PROGRAM, "--out", folder, *CHEAP_FIGURES]
-            drawn = subprocess.run(command, capture_output=True, text=True)
+            drawn = draw("--program", PROGRAM, "--out", folder, *CHEAP_FIGURES)
             self.assertEqual(drawn.returncode, 0, drawn.stderr)
             for name in CHEAP_FIGURES:
                 with self.subTest(figure=name):
@@ -86,7 +90,7 @@ class Figures(unittest.TestCase):
                                      "draw it again: scripts/draw_figures.sh")
 
     def test_an_unknown_figure_names_those_there_are(self):
-        drawn = subprocess.run([sys.executable, "-B", str(SCRIPTS / "draw_figures.py"), "structure"], capture_output=True, text=True)
+        drawn = draw("structure")
         self.assertEqual(drawn.returncode, 2)
         self.assertIn("structures, filters, sampling, data_flow, work_precision", drawn.stderr)
 
@@ -98,8 +102,9 @@ def shapes(figure):
 
 class Numbers(unittest.TestCase):
     def test_the_table_of_the_readme_comes_from_committed_results(self):
-        table = subprocess.run([sys.executable, "-B", str(SCRIPTS / "draw_figures.py"), "--table"], capture_output=True, text=True, check=True)
-        self.assertIn(table.stdout, (ROOT / "README.md").read_text(encoding="utf-8"), "scripts/draw_figures.sh --table prints it")
+        table = draw("--table").stdout
+        self.assertIn("| `octree` |", table)
+        self.assertIn(table, (ROOT / "README.md").read_text(encoding="utf-8"), "scripts/draw_figures.sh --table prints it")
 
     def test_the_observed_orders_come_from_the_committed_verification(self):
         observed = (ROOT / "experiments/verify/results/egl/table.md").read_text(encoding="utf-8")

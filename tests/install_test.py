@@ -27,8 +27,8 @@ class Installed(unittest.TestCase):
 
     def amrtex(self, *arguments):
         """Started in a folder of its own, found through PATH."""
-        path = f"{self.prefix / 'bin'}{os.pathsep}{os.environ['PATH']}"
-        done = subprocess.run(["amrtex", *arguments], cwd=self.prefix, env={**os.environ, "PATH": path}, capture_output=True, text=True)
+        environment = {**os.environ, "PATH": f"{self.prefix / 'bin'}{os.pathsep}{os.environ['PATH']}"}
+        done = subprocess.run(["amrtex", *arguments], cwd=self.prefix, env=environment, capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stderr)
         return done.stdout
 

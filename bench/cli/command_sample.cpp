@@ -38,6 +38,24 @@ std::vector<Vec3d> read_points(const std::string& path) {
   return points;
 }
 
+}  // namespace
+
+Json parse_parameters(const std::vector<std::string>& given) {
+  Json parameters = Json::object();
+  for (const std::string& p : given) {
+    const auto equals = p.find('=');
+    if (equals == std::string::npos)
+      throw UsageError(fmt::format("--parameter {}: accepted: NAME=VALUE, as in page_size=8", clipped(p)));
+    if (!is_utf8(p)) throw UsageError(fmt::format("--parameter {}: not UTF-8; accepted: NAME=VALUE", clipped(p)));
+    const std::string value = p.substr(equals + 1);
+    const Json json = Json::parse(value, nullptr, false);
+    parameters[p.substr(0, equals)] = json.is_discarded() ? Json(value) : json;
+  }
+  return parameters;
+}
+
+namespace {
+
 struct Sampled {
   Vec3d p;
   int level = -1;
@@ -111,20 +129,6 @@ int run(const Arguments& a) {
 }
 
 }  // namespace
-
-Json parse_parameters(const std::vector<std::string>& given) {
-  Json parameters = Json::object();
-  for (const std::string& p : given) {
-    const auto equals = p.find('=');
-    if (equals == std::string::npos)
-      throw UsageError(fmt::format("--parameter {}: accepted: NAME=VALUE, as in page_size=8", clipped(p)));
-    if (!is_utf8(p)) throw UsageError(fmt::format("--parameter {}: not UTF-8; accepted: NAME=VALUE", clipped(p)));
-    const std::string value = p.substr(equals + 1);
-    const Json json = Json::parse(value, nullptr, false);
-    parameters[p.substr(0, equals)] = json.is_discarded() ? Json(value) : json;
-  }
-  return parameters;
-}
 
 void add_sample_command(CLI::App& app, Command& chosen) {
   auto a = std::make_shared<Arguments>();
