@@ -15,6 +15,7 @@
 #include "bench/settings/json_file.hpp"
 #include "renderers/scene/picture.hpp"
 #include "renderers/scene/triangle_reader.hpp"
+#include "structures/generators/synthetic.hpp"
 #include "structures/mesh/amr_hierarchy.hpp"
 #include "structures/mesh/checked.hpp"
 #include "structures/mesh/quoted.hpp"
@@ -261,6 +262,15 @@ TEST(Meshes, WithNamesThatAreNoTextAreRefused) {
   EXPECT_EQ(answer([&] { AmrHierarchy h(mesh); }), "data set bad: the name of the field '\\xff\\x1b[31m' is not UTF-8");
   mesh.fields = {std::string(1000, 'x')};
   EXPECT_LE(answer([&] { AmrHierarchy(mesh).field_index("y"); }).size(), 200U);
+}
+
+TEST(Specifications, OfMoreCellsThanCanBeMadeAreRefusedBeforeTheyAreMade) {
+  for (const char* spec : {R"({"field": "shell", "root": [16777216, 16777216, 16777216], "levels": 1})",
+                           R"({"field": "shell", "root": 1024, "patch": 64, "ratio": 64, "levels": 3, "skip_levels": [0]})",
+                           R"({"field": "shell", "root": 1, "patch": 64, "ratio": 64, "levels": 5})"})
+    EXPECT_THAT(answer([&] { generate_mesh(Json::parse(spec)); }), AllOf(HasSubstr("generator"), HasSubstr("accepted"))) << spec;
+  const Json words{{"field", std::string(1 << 20, 'x')}};
+  EXPECT_LE(answer([&] { generate_mesh(words); }).size(), 400U);
 }
 
 TEST_F(BadFiles, TextOfOneLongLineIsOneShortError) {

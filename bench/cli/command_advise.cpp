@@ -227,7 +227,7 @@ int run(const Arguments& a) {
   if (a.json) fmt::print("{}\n", advice_json(a, request, advice, scene).dump(2));
   if (!advice.chosen) {
     if (!a.json) print_others(advice);
-    fmt::print(stderr, "amrtex: {}\n", why_none(request, advice));
+    fmt::print(stderr, "amrtex: {}\n", one_line(why_none(request, advice), 390));
     return 1;
   }
   const MeasuredCandidate& best = advice.measured[*advice.chosen];
