@@ -222,7 +222,7 @@ MeshDescription description(const Vec3i& root, std::vector<int> ratios) {
 Patch patch(const Box& box) { return {box, {std::vector<double>(static_cast<std::size_t>(box.cells()), 1.0)}}; }
 
 TEST(Meshes, OfTwoCellsInTheLargestDomainAreRead) {
-  constexpr int kEdge = std::numeric_limits<int>::max();
+  constexpr int kEdge = std::numeric_limits<int>::max() - 4096;
   MeshDescription mesh = description(Vec3i(kEdge), {});
   mesh.levels[0] = {patch({Vec3i(0), Vec3i(1)}), patch({Vec3i(kEdge - 1), Vec3i(kEdge)})};
   EXPECT_EQ(answer([&] {
@@ -233,6 +233,8 @@ TEST(Meshes, OfTwoCellsInTheLargestDomainAreRead) {
               EXPECT_TRUE(h.has_holes());
             }),
             "accepted");
+  mesh.root_cells = Vec3i(kEdge + 1);
+  EXPECT_THAT(answer([&] { AmrHierarchy h(mesh); }), HasSubstr("level 0 has 2147479552 cells along an axis; at most 2147479551"));
 }
 
 TEST(Meshes, WithMoreChildrenThanAnyoneCanVisitAreAnsweredAtOnce) {
