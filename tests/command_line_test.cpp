@@ -228,6 +228,40 @@ TEST_F(CommandLine, VerifyRefusesAFolderThatCannotBeBeforeItWorks) {
   expect_complaint(amrtex({"verify", "--out", (at("file") / "in").string()}), 1, HasSubstr("cannot be made"));
 }
 
+TEST_F(CommandLine, ErrorsAreOneLineOfAtMostFourHundredCharacters) {
+  const std::string longest(20000, 'x');
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{longest},
+        {"info", longest},
+        {"info", kData, longest},
+        {"generate", longest, "-o", "x"},
+        {"sample", kData, "--encoding", longest, "--filter", "nearest", "--points", "p"},
+        {"sample", kData, "--encoding", "uniform", "--filter", longest, "--points", "p"},
+        {"info", kData, "--field", longest},
+        {"run", experiment_file(with(small_experiment(), longest, 1)), "--out", at("out").string()}}) {
+    const Result r = amrtex(arguments);
+    EXPECT_NE(r.exit_code, 0);
+    EXPECT_THAT(r.err, StartsWith("amrtex: "));
+    EXPECT_LE(r.err.size(), 401U) << arguments.front();
+    EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+  }
+}
+
+TEST_F(CommandLine, NamesReachTheTerminalWithoutTheirEscapeSequences) {
+  MeshDescription mesh = generate_mesh({{"field", "shell"}, {"levels", 1}, {"root", 4}, {"patch", 4}});
+  write_amrex_plotfile(AmrHierarchy(mesh), at("mesh"));
+  std::string header = read_text(at("mesh") / "Header");
+  header.replace(header.find(mesh.fields[0]), mesh.fields[0].size(), "\x1b[31mred");
+  write_text(at("mesh") / "Header", header);
+  const Result table = amrtex({"info", at("mesh").string()});
+  EXPECT_EQ(table.exit_code, 0) << table.err;
+  EXPECT_THAT(table.out, AllOf(HasSubstr("\\x1b[31mred"), Not(HasSubstr("\x1b"))));
+  const Result json = amrtex({"info", at("mesh").string(), "--json"});
+  EXPECT_EQ(Json::parse(json.out)["fields"][0]["name"], "\x1b[31mred");
+  EXPECT_THAT(json.out, Not(HasSubstr("\x1b")));
+  expect_complaint(amrtex({"info", at("mesh").string(), "--field", "blue"}), 2, HasSubstr("its fields are \\x1b[31mred"));
+}
+
 TEST_F(CommandLine, MissingDataIsSaidClearly) {
   expect_complaint(amrtex({"info", at("none").string()}), 1, AllOf(HasSubstr(at("none").string()), HasSubstr("no such")));
   write_text(at("text"), "no mesh");
@@ -387,6 +421,18 @@ TEST_F(CommandLine, SampleSaysWhichLineIsNoPoint) {
   write_text(at("p"), "0.5 0.5 0.5\n0.5 0.5\n");
   expect_complaint(amrtex({"sample", kData, "--encoding", "uniform", "--filter", "nearest", "--points", at("p")}), 1,
                    AllOf(HasSubstr("line 2"), HasSubstr("x y z")));
+}
+
+TEST_F(CommandLine, SampleNeedsPointsToBeInAFile) {
+  const auto sample = [&](const fs::path& points) {
+    return amrtex({"sample", kData, "--encoding", "uniform", "--filter", "nearest", "--points", points.string()});
+  };
+  fs::create_directories(at("folder"));
+  expect_complaint(sample(at("folder")), 1, HasSubstr("a folder, not a file"));
+  write_text(at("empty"), "# none\n");
+  expect_complaint(sample(at("empty")), 1, HasSubstr("no point"));
+  write_text(at("long"), std::string(1 << 20, '1'));
+  expect_complaint(sample(at("long")), 1, HasSubstr("line 1: 1048576 bytes"));
 }
 
 TEST_F(CommandLine, SampleWithAFilterThatTheEncodingLacks) {

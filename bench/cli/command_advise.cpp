@@ -210,8 +210,9 @@ int run(const Arguments& a) {
   options.context = parse_context_kind(a.context);
   if (!a.scene.empty() && fs::path(a.scene).extension() != ".json")
     throw UsageError(fmt::format("--scene {}: accepted: a name ending in .json", a.scene));
-  if (!a.scene.empty() && !fs::is_directory(fs::absolute(a.scene).parent_path()))
-    throw UsageError(fmt::format("--scene {}: no such folder; accepted: a file in a folder that is there", a.scene));
+  const fs::path folder_of_scene = fs::absolute(a.scene).parent_path();
+  if (const std::string reason = why_absent(folder_of_scene); !a.scene.empty() && !reason.empty())
+    throw UsageError(fmt::format("--scene {}: its folder: {}; accepted: a file in a folder that is there", a.scene, reason));
   const AmrHierarchy mesh = read_data(a);
   const Json scene = scene_json(a, mesh);
   const Experiment experiment = parse_experiment(scene.dump(1), "advise");
@@ -227,7 +228,7 @@ int run(const Arguments& a) {
   if (a.json) fmt::print("{}\n", advice_json(a, request, advice, scene).dump(2));
   if (!advice.chosen) {
     if (!a.json) print_others(advice);
-    fmt::print(stderr, "amrtex: {}\n", why_none(request, advice));
+    fmt::print(stderr, "amrtex: {}\n", one_line(why_none(request, advice), 390));
     return 1;
   }
   const MeasuredCandidate& best = advice.measured[*advice.chosen];

@@ -21,7 +21,10 @@ constexpr std::size_t kMaxDepth = 64;
 /// Objects of ours have tens of keys, and each new one is compared with all before it.
 constexpr std::size_t kMostKeys = 1000;
 /// Of a message behind its place: names of encodings and fields stand in it as the file has them.
-constexpr std::size_t kLongestProblem = 300;
+constexpr std::size_t kLongestProblem = 1000;
+constexpr std::size_t kLongestKey = 1000;  ///< bytes
+/// Elements of lists that lie deeper have the line of what they lie in: a place is written for each of millions of them.
+constexpr std::size_t kLongestPlace = 256;
 /// Longer keys are none of ours, and not worth the time to look for one that is like them.
 constexpr std::size_t kLongestName = 80;
 
@@ -85,6 +88,8 @@ class Builder {
 
   bool key(std::string& name) {
     Level& level = levels_.back();
+    if (name.size() > kLongestKey)
+      refuse(fmt::format("the key {} has {} bytes; at most {} are read", quote(name), name.size(), kLongestKey));
     level.key = std::move(name);
     level.place = level.parent + (level.parent.empty() ? "" : ".") + level.key;
     if (level.value->contains(level.key)) refuse(fmt::format("{}: this key is given twice", clipped(level.place)));
@@ -138,8 +143,10 @@ class Builder {
     if (levels_.empty()) return &(root_ = std::move(value));
     Level& level = levels_.back();
     if (level.value->is_object()) return &(level.value->operator[](level.key) = std::move(value));
-    level.place = fmt::format("{}[{}]", level.parent, level.value->size());
-    note(line_ends_read);
+    if (lines_ != nullptr && level.parent.size() < kLongestPlace) {
+      level.place = fmt::format("{}[{}]", level.parent, level.value->size());
+      note(line_ends_read);
+    }
     level.value->push_back(std::move(value));
     return &level.value->back();
   }

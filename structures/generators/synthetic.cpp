@@ -190,6 +190,7 @@ BlockTree make_tree(const MeshKeys& keys, const RefineCriterion& criterion, cons
   for (int level = 0; level + 1 < levels; ++level) {
     const auto l = static_cast<std::size_t>(level);
     const BlockList& blocks = tree.levels[l];
+    if (keys.rules.skipped[l]) require_children(keys.grid, keys.rules, level, blocks);
     BlockList children =
         keys.rules.skipped[l] ? all_children(keys.grid, level, blocks) : wanted_children(keys.grid, level, blocks, criterion);
     if (body) body->fit_children(level, blocks, children);

@@ -14,7 +14,8 @@ namespace amrtex {
 namespace {
 
 constexpr int kMaxLevels = 64;
-constexpr std::int64_t kMaxIndex = std::numeric_limits<std::int32_t>::max();
+/// Cells along an axis. Boxes are grown by borders, and blocks reach beyond the domain: they fit in 31 bits, too.
+constexpr std::int64_t kMaxIndex = std::numeric_limits<std::int32_t>::max() - 4096;
 
 std::string text(const Vec3i& v) { return fmt::format("({}, {}, {})", v.x, v.y, v.z); }
 std::string text(const Box& b) { return fmt::format("[{}, {})", text(b.lower), text(b.upper)); }
@@ -151,13 +152,17 @@ void AmrHierarchy::Data::check_levels() {
       refuse(fmt::format("the domain's corners along axis {} are {} and {}; the upper one must be larger", "xyz"[axis],
                          mesh.domain_lower[axis], mesh.domain_upper[axis]));
   std::int64_t finest = std::max({mesh.root_cells.x, mesh.root_cells.y, mesh.root_cells.z});
+  const auto require_index = [&](std::size_t level) {
+    if (finest > kMaxIndex)
+      refuse(fmt::format("level {} has {} cells along an axis; at most {} (31 bits of index) are supported", level, finest,
+                         kMaxIndex));
+  };
+  require_index(0);
   for (std::size_t l = 0; l < mesh.ratios.size(); ++l) {
     if (mesh.ratios[l] < 2)
       refuse(fmt::format("the refinement ratio from level {} to {} is {}; at least 2 is needed", l, l + 1, mesh.ratios[l]));
     finest *= mesh.ratios[l];
-    if (finest > kMaxIndex)
-      refuse(fmt::format("level {} has {} cells along an axis; at most {} (31 bits of index) are supported", l + 1, finest,
-                         kMaxIndex));
+    require_index(l + 1);
   }
   for (const std::string& field : mesh.fields)
     if (!is_utf8(field)) refuse(fmt::format("the name of the field {} is not UTF-8", quote(field)));

@@ -47,6 +47,18 @@ void add_neighbours(const BlockGrid& grid, int level, int to, BlockTree& tree) {
   tree.add(to, std::move(wanted));
 }
 
+std::int64_t cells_of_blocks(const BlockGrid& grid, CheckedSize blocks) {
+  return (blocks * grid.patch * grid.patch * grid.patch).or_most();
+}
+
+void require_at_most(std::int64_t cells, const TreeRules& rules) {
+  if (cells <= rules.max_cells) return;
+  throw UsageError(
+      fmt::format("generator: the mesh would hold {} cells or more, at most {} are made; accepted: smaller \"root\" or "
+                  "\"levels\", or a \"refine\" that selects less",
+                  cells, rules.max_cells));
+}
+
 }  // namespace
 
 int BlockGrid::ratio_between(int coarser, int finer) const {
@@ -81,7 +93,13 @@ void BlockTree::add(int level, BlockList blocks) {
 std::int64_t count_cells(const BlockGrid& grid, const BlockTree& tree) {
   std::int64_t blocks = 0;
   for (const BlockList& list : tree.levels) blocks += static_cast<std::int64_t>(list.size());
-  return blocks * grid.patch * grid.patch * grid.patch;
+  return cells_of_blocks(grid, blocks);
+}
+
+void require_children(const BlockGrid& grid, const TreeRules& rules, int level, const BlockList& blocks) {
+  CheckedSize count;
+  for (const Vec3i& block : blocks) count += grid.children(level, block).cells();
+  require_at_most(cells_of_blocks(grid, count), rules);
 }
 
 BlockList all_children(const BlockGrid& grid, int level, const BlockList& blocks) {
@@ -91,12 +109,7 @@ BlockList all_children(const BlockGrid& grid, int level, const BlockList& blocks
 }
 
 void require_cells(const BlockGrid& grid, const TreeRules& rules, const BlockTree& tree) {
-  const std::int64_t cells = count_cells(grid, tree);
-  if (cells <= rules.max_cells) return;
-  throw UsageError(
-      fmt::format("generator: the mesh would hold {} cells or more, at most {} are made; accepted: smaller \"root\" or "
-                  "\"levels\", or a \"refine\" that selects less",
-                  cells, rules.max_cells));
+  require_at_most(count_cells(grid, tree), rules);
 }
 
 void close_tree(const BlockGrid& grid, const TreeRules& rules, BlockTree& tree) {
@@ -111,7 +124,10 @@ void close_tree(const BlockGrid& grid, const TreeRules& rules, BlockTree& tree) 
     }
     for (int level = 0; level < finest; ++level) {
       const auto l = static_cast<std::size_t>(level);
-      if (rules.skipped[l]) tree.add(level + 1, all_children(grid, level, tree.levels[l]));
+      if (rules.skipped[l]) {
+        require_children(grid, rules, level, tree.levels[l]);
+        tree.add(level + 1, all_children(grid, level, tree.levels[l]));
+      }
       require_cells(grid, rules, tree);
     }
   }

@@ -49,7 +49,7 @@ struct TreeRules {
   std::int64_t max_cells = INT64_MAX;  ///< of the whole tree
 };
 
-/// Cells of all blocks, unclipped.
+/// Cells of all blocks, unclipped; INT64_MAX where that takes more than 63 bits.
 std::int64_t count_cells(const BlockGrid& grid, const BlockTree& tree);
 
 /// All blocks of the next finer level over the given ones.
@@ -58,6 +58,9 @@ BlockList all_children(const BlockGrid& grid, int level, const BlockList& blocks
 /// Adds the fewest blocks that make the rules true and give every block its parent.
 /// Where level 0 has no block nothing is added. Throws a UsageError past `max_cells`.
 void close_tree(const BlockGrid& grid, const TreeRules& rules, BlockTree& tree);
+
+/// Throws a UsageError when all blocks over the given ones hold more cells than allowed: asked before they are made.
+void require_children(const BlockGrid& grid, const TreeRules& rules, int level, const BlockList& blocks);
 
 /// Throws a UsageError when the tree holds more cells than allowed.
 void require_cells(const BlockGrid& grid, const TreeRules& rules, const BlockTree& tree);
