@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "structures/mesh/error.hpp"
+
 namespace amrtex {
 
 namespace {
