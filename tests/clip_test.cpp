@@ -2,8 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "renderers/consumers/box_consumer.hpp"
 #include "renderers/bindings/scene_bindings.hpp"
+#include "renderers/consumers/box_consumer.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {

@@ -5,8 +5,8 @@
 
 #include <set>
 
-#include "renderers/consumers/raycaster.hpp"
 #include "renderers/bindings/scene_bindings.hpp"
+#include "renderers/consumers/raycaster.hpp"
 #include "shaders/shader_library.hpp"
 #include "tests/pictures.hpp"
 
@@ -228,8 +228,8 @@ TEST(Conformance, StorageErrsByHalfAQuantum) {
         const Comparison exact = compare(positions, expected, in_double, (bound + 1e-12) * value_range(h));
         EXPECT_TRUE(exact) << exact;
         EXPECT_GT(exact.worst, bound * value_range(h) / 16) << "the payload is of this storage";
-        const Comparison on_gl = compare(positions, expected, probe_on_gl(gl, h, Structure(gl, field), positions),
-                                         (bound + 1e-6) * value_range(h));
+        const Comparison on_gl =
+            compare(positions, expected, probe_on_gl(gl, h, Structure(gl, field), positions), (bound + 1e-6) * value_range(h));
         EXPECT_TRUE(on_gl) << on_gl;
       }
     }
@@ -769,8 +769,7 @@ TEST(MutationControl, CorruptedTexturesReachTheGlContextToo) {
       EncodedField field = build(h, c, {.filtering = filtering});
       const Values expected = reference_values(h, field.definition, positions);
       for_each_value_texture(field, [](HostTexture& t) { std::rotate(t.data.begin(), t.data.begin() + 4, t.data.end()); });
-      EXPECT_FALSE(
-          compare(positions, expected, probe_on_gl(gl, h, Structure(gl, field), positions), 1e-3 * value_range(h)));
+      EXPECT_FALSE(compare(positions, expected, probe_on_gl(gl, h, Structure(gl, field), positions), 1e-3 * value_range(h)));
     }
 }
 

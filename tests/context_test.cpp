@@ -9,9 +9,9 @@
 #include <numeric>
 
 #include "renderers/context/context_probe.hpp"
-#include "renderers/gpu/gpu_timer.hpp"
 #include "renderers/gpu/draw_target.hpp"
 #include "renderers/gpu/gpu_field.hpp"
+#include "renderers/gpu/gpu_timer.hpp"
 #include "renderers/gpu/program.hpp"
 #include "structures/mesh/error.hpp"
 

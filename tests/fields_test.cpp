@@ -2,11 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "renderers/bindings/scene_bindings.hpp"
 #include "renderers/bindings/scene_needs.hpp"
 #include "renderers/consumers/box_consumer.hpp"
 #include "renderers/consumers/make_consumer.hpp"
 #include "renderers/cpu/sampled_reference.hpp"
-#include "renderers/bindings/scene_bindings.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {

@@ -33,17 +33,18 @@ std::string contract() {
 }
 
 TEST(Filters, HaveTheSameNumbersInTheShaders) {
-  for (const FilterInfo& info : kFilters)
-    EXPECT_THAT(contract(), HasSubstr(fmt::format("#define AMRTEX_FILTER_{} {}\n", upper_case(info.name), static_cast<int>(info.filter))));
+  for (const FilterInfo& info : kFilterTable)
+    EXPECT_THAT(contract(),
+                HasSubstr(fmt::format("#define AMRTEX_FILTER_{} {}\n", upper_case(info.name), static_cast<int>(info.filter))));
 }
 
 TEST(Filters, AreFoundByTheirNames) {
-  for (const FilterInfo& info : kFilters) EXPECT_EQ(parse_filter(info.name), info.filter);
+  for (const FilterInfo& info : kFilterTable) EXPECT_EQ(parse_filter(info.name), info.filter);
   try {
     parse_filter("cubic");
     ADD_FAILURE() << "no such filter";
   } catch (const UsageError& error) {
-    for (const FilterInfo& info : kFilters) EXPECT_THAT(error.what(), HasSubstr(std::string(info.name)));
+    for (const FilterInfo& info : kFilterTable) EXPECT_THAT(error.what(), HasSubstr(std::string(info.name)));
   }
 }
 
@@ -51,7 +52,7 @@ TEST(Filters, AreDefinedInTheShadersReadme) {
   std::ifstream file(std::string(AMRTEX_SOURCE_DIR) + "/shaders/README.md");
   std::stringstream text;
   text << file.rdbuf();
-  for (const FilterInfo& info : kFilters) EXPECT_THAT(text.str(), HasSubstr(fmt::format("| `{}` |", info.name)));
+  for (const FilterInfo& info : kFilterTable) EXPECT_THAT(text.str(), HasSubstr(fmt::format("| `{}` |", info.name)));
 }
 
 TEST(Filters, HaveAReferenceThatReproducesAConstant) {
@@ -79,7 +80,7 @@ double largest_jump(const AmrHierarchy& h, const FilterDefinition& definition) {
 
 TEST(Filters, AreContinuousAsTheirRowSays) {
   const AmrHierarchy h = nested(waves).hierarchy();
-  for (const FilterInfo& info : kFilters) {
+  for (const FilterInfo& info : kFilterTable) {
     const FilterDefinition definition{info.filter, info.continuity == Continuity::page ? 2 : 0, 0};
     if (definition.continuous_everywhere())
       EXPECT_LT(largest_jump(h, definition), 1e-6) << info.name;

@@ -8,9 +8,9 @@
 
 #include "bench/measure/runner.hpp"
 #include "bench/records/record.hpp"
+#include "renderers/bindings/scene_bindings.hpp"
 #include "renderers/cpu/cpu_field.hpp"
 #include "renderers/gpu/program.hpp"
-#include "renderers/bindings/scene_bindings.hpp"
 #include "shaders/shader_library.hpp"
 #include "structures/generators/random_mesh.hpp"
 #include "tests/pictures.hpp"

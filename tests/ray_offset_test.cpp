@@ -4,8 +4,8 @@
 
 #include <map>
 
-#include "renderers/consumers/box_consumer.hpp"
 #include "renderers/bindings/scene_bindings.hpp"
+#include "renderers/consumers/box_consumer.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {

@@ -582,11 +582,9 @@ TEST(ReferenceFilter, FillsAreFaceElseEdgeElseCornerNeighbours) {
   const AmrHierarchy two = field_without([&](const Vec3i& c) { return distance(c) == 0 || c == Vec3i(0, 1, 1); });
   EXPECT_DOUBLE_EQ(ReferenceField(two, 0).filled_value(0, middle), (112 + 101 + 121 + 11 + 211) / 5.0) << "mean of five";
   const AmrHierarchy faces = field_without([&](const Vec3i& c) { return distance(c) <= 1 || c == Vec3i(0, 0, 1); });
-  EXPECT_DOUBLE_EQ(ReferenceField(faces, 0).filled_value(0, middle), (12 * 111 - 100) / 11.0)
-      << "mean of eleven edge neighbours";
+  EXPECT_DOUBLE_EQ(ReferenceField(faces, 0).filled_value(0, middle), (12 * 111 - 100) / 11.0) << "mean of eleven edge neighbours";
   const AmrHierarchy edges = field_without([&](const Vec3i& c) { return distance(c) <= 2 || c == Vec3i(2); });
-  EXPECT_DOUBLE_EQ(ReferenceField(edges, 0).filled_value(0, middle), (8 * 111 - 222) / 7.0)
-      << "mean of seven corner neighbours";
+  EXPECT_DOUBLE_EQ(ReferenceField(edges, 0).filled_value(0, middle), (8 * 111 - 222) / 7.0) << "mean of seven corner neighbours";
   const ReferenceField field(only_middle, 0);
   EXPECT_EQ(field.filled_value(0, {-1, 2, 1}), 120) << "outside: clamped at a face";
   EXPECT_EQ(field.filled_value(0, {3, 2, 3}), 222) << "... at an edge";

@@ -11,6 +11,7 @@
 #include <limits>
 
 #include "renderers/scene/picture.hpp"
+#include "structures/mesh/error.hpp"
 
 namespace amrtex {
 namespace {

@@ -10,10 +10,10 @@
 #include <random>
 #include <set>
 
-#include "renderers/consumers/box_consumer.hpp"
-#include "renderers/scene/triangle_layer.hpp"
-#include "renderers/reference/hierarchy_reference.hpp"
 #include "renderers/bindings/scene_bindings.hpp"
+#include "renderers/consumers/box_consumer.hpp"
+#include "renderers/reference/hierarchy_reference.hpp"
+#include "renderers/scene/triangle_layer.hpp"
 #include "renderers/scene/triangle_reader.hpp"
 #include "tests/pictures.hpp"
 

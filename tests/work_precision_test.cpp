@@ -5,8 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "bench/records/record.hpp"
 #include "bench/numbers/pareto.hpp"
+#include "bench/records/record.hpp"
 #include "structures/mesh/error.hpp"
 #include "tests/table_files.hpp"
 

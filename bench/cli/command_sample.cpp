@@ -5,6 +5,7 @@
 #include "bench/cli/commands.hpp"
 #include "bench/measure/error_split.hpp"
 #include "renderers/consumers/probe.hpp"
+#include "renderers/reference/hierarchy_reference.hpp"
 #include "structures/mesh/quoted.hpp"
 #include "structures/readers/mesh_io.hpp"
 #include "structures/readers/reader_tools.hpp"

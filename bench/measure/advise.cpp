@@ -8,8 +8,8 @@
 #include <map>
 #include <set>
 
-#include "bench/records/record.hpp"
 #include "bench/numbers/pareto.hpp"
+#include "bench/records/record.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {

@@ -23,6 +23,7 @@ struct ChangeTimes {
 /// Goes `times` times from the scene to the changed one or back: what decides which regions are hidden is made anew on the host,
 /// uploaded and bound, and GL has finished. No frame is drawn. Throws UnsupportedError where the changed scene needs another
 /// shader, or another structure because what was hidden was not built.
-ChangeTimes time_changes(Context& context, const DomainGeometry& geometry, const Structure& structure, const Scene& scene, int times);
+ChangeTimes time_changes(Context& context, const DomainGeometry& geometry, const Structure& structure, const Scene& scene,
+                         int times);
 
 }  // namespace amrtex

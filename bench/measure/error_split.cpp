@@ -62,7 +62,8 @@ Scene without_shortcuts(const Scene& scene) {
 Picture draw_samples(const SplitRequest& r, const Scene& scene, const EncodedField& field) {
   std::vector<std::unique_ptr<HierarchyReference>> references;
   for (int number = 0; number < field.field_count; ++number)
-    references.push_back(std::make_unique<HierarchyReference>(r.hierarchy, r.structure.request.field_at(number), field.definition));
+    references.push_back(
+        std::make_unique<HierarchyReference>(r.hierarchy, r.structure.request.field_at(number), field.definition));
   const FieldValues values = [&](const FinestPosition& p, int number) {
     return references[static_cast<std::size_t>(number)]->sample(p);
   };

@@ -10,8 +10,8 @@
 #include "bench/measure/change_time.hpp"
 #include "bench/measure/environment.hpp"
 #include "bench/measure/error_split.hpp"
-#include "bench/numbers/image_error.hpp"
 #include "bench/measure/left_out_time.hpp"
+#include "bench/numbers/image_error.hpp"
 #include "bench/numbers/statistics.hpp"
 #include "bench/records/record.hpp"
 #include "renderers/bindings/scene_needs.hpp"
@@ -148,7 +148,8 @@ class Runner {
     std::unique_ptr<Built> built;
     try {
       built = make(build, scene_of(experiment_, *renders.front()));
-      if (experiment_.explain_left_out) time_left_out(find_encoding(build.encoding), *mesh_, built->structure.request, built->structure.field);
+      if (experiment_.explain_left_out)
+        time_left_out(find_encoding(build.encoding), *mesh_, built->structure.request, built->structure.field);
     } catch (const UsageError&) {
       throw;  // a bad parameter concerns the whole experiment
     } catch (const std::exception& error) {
@@ -279,8 +280,7 @@ class Runner {
     const auto truth = analytic_field(experiment_.datasets[loaded_]);
     const double step = experiment_.reference->step;
     const Encoding& encoding = find_encoding(built.structure.field.encoding);
-    return split_json(split_error(
-        {*mesh_, encoding, built.structure, *context_, scene, reference, picture, step, truth.get()}));
+    return split_json(split_error({*mesh_, encoding, built.structure, *context_, scene, reference, picture, step, truth.get()}));
   }
 
   /// What the level of detail did: the picture against that of the same structure without it.
@@ -393,10 +393,10 @@ class Runner {
       if (!context_->info().has_extension(name)) record["context"]["extensions_missing"].push_back(name);
     record["context"]["warnings"] = Json::array();
     if (built == nullptr) return;
-    record["memory"] = memory_json(built->field, mesh_->leaf_cells());
+    record["memory"] = memory_json(built->structure.field, mesh_->leaf_cells());
     record["build_seconds"] = built->build_seconds;
     record["upload_seconds"] = built->upload_seconds;
-    record["left_out"] = left_out_json(built->field);
+    record["left_out"] = left_out_json(built->structure.field);
     record["statistics"] = built->structure.field.statistics;
     record["storage_scale"] = {{"a", built->structure.field.scale.offset}, {"b", built->structure.field.scale.scale}};
   }

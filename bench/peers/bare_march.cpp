@@ -9,8 +9,8 @@
 #include "bench/measure/runner.hpp"
 #include "renderers/bindings/scene_needs.hpp"
 #include "renderers/consumers/raycaster.hpp"
-#include "renderers/gpu/gpu_timer.hpp"
 #include "renderers/gpu/draw_target.hpp"
+#include "renderers/gpu/gpu_timer.hpp"
 
 namespace amrtex {
 namespace {

@@ -11,8 +11,8 @@
 #include <set>
 #include <tuple>
 
-#include "bench/records/record.hpp"
 #include "bench/numbers/pareto.hpp"
+#include "bench/records/record.hpp"
 #include "bench/report/report.hpp"
 #include "bench/settings/json_file.hpp"
 

@@ -41,8 +41,8 @@ void require_more_fields(const EncodedField& field, const Scene& scene) {
   if (scene.more_fields.empty()) return;
   const auto count = static_cast<int>(1 + scene.more_fields.size());
   if (count > kMostFields)
-    throw UsageError(fmt::format("encoding {}: {} fields with transfer functions; at most {} are supported", field.encoding, count,
-                                 kMostFields));
+    throw UsageError(fmt::format("encoding {}: {} fields with transfer functions; at most {} are supported", field.encoding,
+                                 count, kMostFields));
   if (field.field_count < count)
     throw Error(fmt::format("encoding {}: {} fields with transfer functions; the structure was built with {}", field.encoding,
                             count, field.field_count));

@@ -1,4 +1,5 @@
-// What a program is told before it draws: defines, uniforms and buffers, the same for the GL context and the CPU build of its text.
+// What a program is told before it draws: defines, uniforms and buffers, the same for the GL context and the CPU build of its
+// text.
 #pragma once
 
 #include <string>

@@ -28,7 +28,8 @@ void add_points(const TransferFunction& tf, double unit, SceneBindings& b, const
     const double kappa = std::min(tf.extinction[i].extinction * unit, kMostExtinction);
     double slope = 0;
     if (i + 1 < tf.extinction.size())
-      slope = (std::min(tf.extinction[i + 1].extinction * unit, kMostExtinction) - kappa) / (tf.axis(tf.extinction[i + 1].value) - x);
+      slope =
+          (std::min(tf.extinction[i + 1].extinction * unit, kMostExtinction) - kappa) / (tf.axis(tf.extinction[i + 1].value) - x);
     extinction.insert(extinction.end(), {x, kappa, slope});
   }
   b.set("u_extinction_points" + suffix, extinction);

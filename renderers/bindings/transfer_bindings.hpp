@@ -20,7 +20,8 @@ double extinction_unit(const DomainGeometry& geometry, const TransferFunction& t
 /// As u_color_points in shaders/transfer_function.glsl.
 std::vector<double> color_points(const TransferFunction& transfer_function);
 
-/// The scene's first transfer function (shaders/transfer_function.glsl). Modes without one declare points of which nothing is read.
+/// The scene's first transfer function (shaders/transfer_function.glsl). Modes without one declare points of which nothing is
+/// read.
 void add_transfer_function(const DomainGeometry& geometry, const Scene& scene, SceneBindings& bindings);
 
 /// Those of the fields beside the first (shaders/fields.glsl): nothing of theirs where there are none.

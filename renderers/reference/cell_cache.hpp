@@ -14,8 +14,8 @@ class CellCache {
  public:
   T& at(int level, const Vec3i& c) {
     // neighbouring cells never share a slot
-    const auto slot = static_cast<std::uint32_t>((c.x & 31) | (c.y & 31) << 5 | (c.z & 31) << 10) ^
-                      static_cast<std::uint32_t>(level) * 0x9E35U;
+    const auto slot =
+        static_cast<std::uint32_t>((c.x & 31) | (c.y & 31) << 5 | (c.z & 31) << 10) ^ static_cast<std::uint32_t>(level) * 0x9E35U;
     return entries_[slot & (kEntries - 1)];
   }
 

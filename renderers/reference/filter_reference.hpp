@@ -87,6 +87,7 @@ class PlainFilterReference final : public FilterReference {
 };
 
 /// The definition's filter. Throws Error where its parameters contradict the mesh, and for a filter without a reference.
-std::unique_ptr<FilterReference> make_filter_reference(const AmrHierarchy& hierarchy, int field, const FilterDefinition& definition);
+std::unique_ptr<FilterReference> make_filter_reference(const AmrHierarchy& hierarchy, int field,
+                                                       const FilterDefinition& definition);
 
 }  // namespace amrtex

@@ -300,8 +300,7 @@ const FilterReference* HierarchyReference::Data::other_filter(const std::string&
   const std::lock_guard lock(mutex);
   std::unique_ptr<FilterReference>& other = others[index];
   // while it waits for its own tasks this thread must not take up another picture, which would lock again
-  if (!other)
-    tbb::this_task_arena::isolate([&] { other = make_filter_reference(hierarchy, index, filter->definition()); });
+  if (!other) tbb::this_task_arena::isolate([&] { other = make_filter_reference(hierarchy, index, filter->definition()); });
   return other.get();
 }
 
@@ -345,7 +344,8 @@ Picture HierarchyReference::draw(const Scene& scene, double step, const Analytic
     lamp.emplace(scene, *data_->filter, extinction_scale(h, scene.transfer_function), drawing.lower, drawing.upper, drawing.part);
   std::vector<OtherField> others;
   for (const FieldTransfer& f : scene.more_fields)
-    others.push_back({data_->other_filter(f.field), TransferTable(f.transfer_function, extinction_scale(h, f.transfer_function))});
+    others.push_back(
+        {data_->other_filter(f.field), TransferTable(f.transfer_function, extinction_scale(h, f.transfer_function))});
   std::optional<TriangleLayer> triangles;
   if (!scene.settings.triangles.empty()) triangles = trace_triangles(scene);
   Picture picture(scene.settings.width, scene.settings.height, scene.settings.picture_channels());

@@ -1,5 +1,5 @@
-// What filters are defined from (shaders/README.md, "Filters"), by search in the hierarchy: leaves, level values, fills. Private to
-// the reference; written from the definitions and from leaf cells alone, not shared with encodings.
+// What filters are defined from (shaders/README.md, "Filters"), by search in the hierarchy: leaves, level values, fills. Private
+// to the reference; written from the definitions and from leaf cells alone, not shared with encodings.
 #pragma once
 
 #include <array>

@@ -44,8 +44,8 @@ class SurfaceFinder {
 
 /// What the rays of one picture share.
 struct SurfaceScene {
-  SurfaceScene(const Scene& scene, const FilterReference& filter, const FilterReference* color_filter, const TransferTable* volume,
-               double part);
+  SurfaceScene(const Scene& scene, const FilterReference& filter, const FilterReference* color_filter,
+               const TransferTable* volume, double part);
 
   const Scene& scene;
   const Isosurfaces& settings;

@@ -1,5 +1,4 @@
 // Facts of `exabricks` alone; what every encoding must do is in tests/.
-#include "renderers/bindings/scene_needs.hpp"
 #include "structures/exabricks/exabricks.hpp"
 
 #include <gmock/gmock.h>
@@ -8,6 +7,7 @@
 
 #include <set>
 
+#include "renderers/bindings/scene_needs.hpp"
 #include "renderers/consumers/raycaster.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
 #include "renderers/reference/reference_point.hpp"

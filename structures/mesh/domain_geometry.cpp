@@ -12,8 +12,7 @@ DomainGeometry::DomainGeometry(const AmrHierarchy& mesh)
       longest_patch(0) {
   for (int level = 0; level < mesh.level_count(); ++level) {
     level_widths.push_back(mesh.cell_width(level));
-    for (const Patch& patch : mesh.patches(level))
-      longest_patch = std::max(longest_patch, glm::length(Vec3d(patch.box.size())));
+    for (const Patch& patch : mesh.patches(level)) longest_patch = std::max(longest_patch, glm::length(Vec3d(patch.box.size())));
   }
 }
 

@@ -15,7 +15,7 @@ namespace {
 template <class Wanted>
 std::vector<Filter> filters_where(Wanted&& wanted) {
   std::vector<Filter> filters;
-  for (const FilterInfo& info : kFilters)
+  for (const FilterInfo& info : kFilterTable)
     if (wanted(info.filter)) filters.push_back(info.filter);
   return filters;
 }
@@ -34,7 +34,7 @@ std::span<const Filter> interpolating_filters() {
 
 Filter parse_filter(std::string_view name) {
   std::vector<std::string_view> names;
-  for (const FilterInfo& info : kFilters) {
+  for (const FilterInfo& info : kFilterTable) {
     if (info.name == name) return info.filter;
     names.push_back(info.name);
   }

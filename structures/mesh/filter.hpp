@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <span>
 #include <string_view>
 
@@ -22,7 +23,7 @@ struct FilterInfo {
 
 /// All filters, in the order of their numbers. What differs from filter to filter outside of its reference
 /// (renderers/reference/filters/) and of encodings stands in its row.
-inline constexpr std::array kFilters{
+inline constexpr std::array kFilterTable{
     FilterInfo{Filter::nearest, "nearest", Continuity::cell},
     FilterInfo{Filter::linear_lod, "linear_lod", Continuity::level},
     FilterInfo{Filter::linear_page, "linear_page", Continuity::page},
@@ -30,12 +31,12 @@ inline constexpr std::array kFilters{
     FilterInfo{Filter::basis, "basis", Continuity::everywhere},
 };
 
-constexpr const FilterInfo& filter_info(Filter filter) { return kFilters[static_cast<std::size_t>(filter)]; }
+constexpr const FilterInfo& filter_info(Filter filter) { return kFilterTable[static_cast<std::size_t>(filter)]; }
 
 /// Is every filter's row at its number?
 constexpr bool filters_are_in_order() {
-  for (std::size_t i = 0; i < kFilters.size(); ++i)
-    if (kFilters[i].filter != static_cast<Filter>(i)) return false;
+  for (std::size_t i = 0; i < kFilterTable.size(); ++i)
+    if (kFilterTable[i].filter != static_cast<Filter>(i)) return false;
   return true;
 }
 static_assert(filters_are_in_order());

@@ -8,8 +8,8 @@
 #include <bit>
 #include <set>
 
-#include "renderers/consumers/raycaster.hpp"
 #include "renderers/bindings/scene_bindings.hpp"
+#include "renderers/consumers/raycaster.hpp"
 #include "shaders/shader_library.hpp"
 #include "structures/generators/random_mesh.hpp"
 #include "structures/generators/synthetic.hpp"
@@ -202,8 +202,7 @@ TEST(Octree, TheLayoutOfThePaperHoldsTheFieldInEightBits) {
         const Comparison on_cpu =
             compare(positions, expected, probe_on_cpu(h, field, Precision::double_precision, positions), tolerance);
         EXPECT_TRUE(on_cpu) << filter_name(filter) << " " << traversal << ": " << on_cpu;
-        const Comparison on_gl =
-            compare(positions, expected, probe_on_gl(gl, h, Structure(gl, field), positions), tolerance);
+        const Comparison on_gl = compare(positions, expected, probe_on_gl(gl, h, Structure(gl, field), positions), tolerance);
         EXPECT_TRUE(on_gl) << filter_name(filter) << " " << traversal << ": " << on_gl;
       }
 }

@@ -111,7 +111,8 @@ class BasisPieces final : public FilterPieces {
 
 }  // namespace
 
-std::unique_ptr<FilterReference> make_basis_reference(const AmrHierarchy& hierarchy, int field, const FilterDefinition& definition) {
+std::unique_ptr<FilterReference> make_basis_reference(const AmrHierarchy& hierarchy, int field,
+                                                      const FilterDefinition& definition) {
   return std::make_unique<PlainFilterReference<BasisPoints, BasisPieces>>(hierarchy, field, definition);
 }
 

@@ -32,7 +32,8 @@ class NearestPieces final : public FilterPieces {
 
 }  // namespace
 
-std::unique_ptr<FilterReference> make_nearest_reference(const AmrHierarchy& hierarchy, int field, const FilterDefinition& definition) {
+std::unique_ptr<FilterReference> make_nearest_reference(const AmrHierarchy& hierarchy, int field,
+                                                        const FilterDefinition& definition) {
   return std::make_unique<PlainFilterReference<NearestPoints, NearestPieces>>(hierarchy, field, definition);
 }
 
