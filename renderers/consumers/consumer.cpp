@@ -28,11 +28,11 @@ SceneResources::SceneResources(Context& context, const AmrHierarchy& hierarchy, 
   for (const HostTexture& b : bindings_.buffers) buffers_.push_back(upload(context, b));
 }
 
-ShaderKey SceneResources::shader_key(const std::string& entry, bool counting) const {
+ShaderKey scene_key(const std::string& entry, const EncodedField& field, const SceneBindings& bindings, bool counting) {
   ShaderKey key;
   key.entry = entry;
-  key.use(field_->shader);
-  for (const auto& [name, value] : bindings_.defines) key.define(name, value);
+  key.use(field.shader);
+  for (const auto& [name, value] : bindings.defines) key.define(name, value);
   key.define("AMRTEX_COUNT", counting ? 1 : 0);
   return key;
 }

@@ -47,13 +47,15 @@ class Consumer {
 std::unique_ptr<Consumer> make_consumer(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field,
                                         const GpuField& gpu, const Scene& scene);
 
+/// Entry file with the defines of field and scene.
+ShaderKey scene_key(const std::string& entry, const EncodedField& field, const SceneBindings& bindings, bool counting);
+
 /// What the scene adds to the field's part of a program: defines, uniforms, tables on the GPU.
 class SceneResources {
  public:
   SceneResources(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene);
 
-  /// Entry file with the defines of field and scene.
-  ShaderKey shader_key(const std::string& entry, bool counting) const;
+  ShaderKey shader_key(const std::string& entry, bool counting) const { return scene_key(entry, *field_, bindings_, counting); }
   /// Uses the program, sets what the scene tells it and binds the field.
   void bind(Program& program, const GpuField& gpu) const;
   /// Storage buffers of field and scene.

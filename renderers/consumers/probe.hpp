@@ -10,6 +10,9 @@
 
 namespace amrtex {
 
+/// Of the shader that samples field number `number` at points.
+ShaderKey probe_key(const EncodedField& field, int number);
+
 /// The shader's positions: the fraction as float, so that GL and CPU see the same point. `number`
 /// of the fields that the structure holds; throw UsageError where there are not so many.
 std::vector<ProbeResult> probe_on_gl(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field,

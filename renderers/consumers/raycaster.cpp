@@ -5,6 +5,11 @@
 #include <chrono>
 
 namespace amrtex {
+namespace {
+
+const char* entry_of(const Scene& scene) { return scene.settings.triangles.empty() ? "raycast.frag" : "raycast_triangles.frag"; }
+
+}  // namespace
 
 Raycaster::Raycaster(Context& context, const AmrHierarchy& hierarchy, const EncodedField& field, const GpuField& gpu,
                      const Scene& scene)
@@ -19,8 +24,7 @@ Raycaster::Raycaster(Context& context, const AmrHierarchy& hierarchy, const Enco
 Program Raycaster::make_program(bool counting) const {
   ShaderKey vertex;
   vertex.entry = "fullscreen.vert";
-  const char* entry = scene_.settings.triangles.empty() ? "raycast.frag" : "raycast_triangles.frag";
-  return {*context_, assemble_shader(vertex), assemble_shader(resources_.shader_key(entry, counting))};
+  return {*context_, assemble_shader(vertex), assemble_shader(resources_.shader_key(entry_of(scene_), counting))};
 }
 
 FrameTime Raycaster::draw() {
@@ -63,12 +67,10 @@ Picture render_on_cpu(const AmrHierarchy& hierarchy, const EncodedField& field, 
 
 Picture trace_on_cpu(CpuField& cpu, const AmrHierarchy& hierarchy, const EncodedField& field, const Scene& scene) {
   const SceneBindings bindings = bind_scene(hierarchy, field, scene);
-  auto defines = bindings.defines;
-  defines.insert(defines.end(), field.shader.defines.begin(), field.shader.defines.end());
   std::vector<const HostTexture*> textures;
   for (const HostTexture& t : field.textures) textures.push_back(&t);
   for (const HostTexture& t : bindings.buffers) textures.push_back(&t);
-  cpu.set(defines, bindings.uniforms, textures);
+  cpu.set(scene_key(entry_of(scene), field, bindings, false), bindings.uniforms, textures);
   const RenderSettings& s = scene.settings;
   Picture picture(s.width, s.height, s.picture_channels());
   tbb::parallel_for(0, s.height, [&](int y) {

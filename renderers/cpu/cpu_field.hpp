@@ -4,6 +4,7 @@
 #include <array>
 #include <memory>
 
+#include "renderers/gpu/shader_assembler.hpp"
 #include "renderers/gpu/uniforms.hpp"
 #include "renderers/scene/picture.hpp"
 #include "renderers/scene/scene.hpp"
@@ -21,10 +22,9 @@ struct ProbeResult {
 class CpuField {
  public:
   virtual ~CpuField() = default;
-  /// Binds defines, uniforms and host data by name; throws Error naming what the text
-  /// declares and nobody provides. The texture's data must outlive this object.
-  virtual void set(const std::vector<std::pair<std::string, int>>& defines, const UniformValues& uniforms,
-                   const std::vector<const HostTexture*>& textures) = 0;
+  /// Binds defines, uniforms and host data by name. `key`: that of the GLSL shader whose work is to be done. Throws Error naming
+  /// what that shader's text declares and nobody provides. The textures' data must outlive this object.
+  virtual void set(const ShaderKey& key, const UniformValues& uniforms, const std::vector<const HostTexture*>& textures) = 0;
   /// Field number `field`; throws UsageError where there are not so many.
   virtual ProbeResult sample(const Vec3i& finest_cell, const Vec3d& fraction, int field = 0) const = 0;
   /// Ray of the pixel whose centre is (x, y) from the lower left, in pixels.

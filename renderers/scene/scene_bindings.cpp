@@ -490,6 +490,9 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
     const std::vector<double> invisible = invisible_ranges(tf);
     invisible_count = static_cast<int>(invisible.size() / 2);
     if (invisible_count > 0) b.uniforms.push_back({"u_invisible_ranges", invisible});
+  } else {
+    b.uniforms.push_back({"u_extinction_points", std::vector<double>(3)});
+    b.uniforms.push_back({"u_color_points", std::vector<double>(5)});
   }
   b.defines = {{"AMRTEX_RAY_DOUBLE", needs_double_rays(h, scene) ? 1 : 0},
                {"AMRTEX_LOGARITHMIC", s.draws_volume() && scene.transfer_function.logarithmic ? 1 : 0},
