@@ -1,14 +1,6 @@
 // What a ray has gathered so far, and how one interval adds to it.
-#if !AMRTEX_CPP
-#ifndef AMRTEX_MODE
-#error AMRTEX_MODE must be defined: one of the AMRTEX_MODE_... below
-#endif
-#ifndef AMRTEX_INTEGRATOR
-#error AMRTEX_INTEGRATOR must be defined: one of the AMRTEX_INTEGRATOR_... below
-#endif
-#endif
-DEFINE_INT(AMRTEX_MODE)
-DEFINE_INT(AMRTEX_INTEGRATOR)
+DEFINE_INT(AMRTEX_MODE)        // one of the AMRTEX_MODE_... below
+DEFINE_INT(AMRTEX_INTEGRATOR)  // one of the AMRTEX_INTEGRATOR_... below
 
 // the same numbers as enum class Mode (renderers/scene/scene.hpp)
 #define AMRTEX_MODE_DVR 0

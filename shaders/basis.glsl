@@ -5,14 +5,6 @@
 //   AMRTEX_BASIS_MISSING   1 where cells of pieces may have no value, else 0
 //   AMRTEX_BASIS_SEARCH    1 where samples search their pieces, else 0
 // and defines the functions that are only declared here.
-#if !AMRTEX_CPP
-#ifndef AMRTEX_BASIS_MISSING
-#error AMRTEX_BASIS_MISSING must be defined: 1 where cells of pieces may have no value, else 0
-#endif
-#ifndef AMRTEX_BASIS_SEARCH
-#error AMRTEX_BASIS_SEARCH must be defined: 1 where samples search their pieces, else 0
-#endif
-#endif
 
 // The first three words as a corner of a box.
 ivec3 corner_of(IN(uvec4) words) { return ivec3(int(words.x), int(words.y), int(words.z)); }

@@ -5,11 +5,9 @@
 #include "transfer_function.glsl"
 #include "accumulate.glsl"
 #include "isosurface.glsl"
-#include "march.glsl"
+#include "sample.glsl"
 
-#ifndef AMRTEX_CLAIM
-#error AMRTEX_CLAIM must be defined: 1 where invisible boxes keep others out of their pixels, else 0
-#endif
+DEFINE_INT(AMRTEX_CLAIM)  // 1 where invisible boxes keep others out of their pixels, else 0
 
 layout(location = 0) in vec3 in_corner;  // x, y: -1 to 1 over the picture; z: number of the slice, 0 without slices
 layout(location = 1) in ivec3 in_cell;   // lower cell of the box

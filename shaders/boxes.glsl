@@ -1,11 +1,6 @@
 // What a ray gathers in one box alone, for consumers that draw box by box and blend the results: the same samples
 // as march.glsl takes there (multi-pass), or one sample on a plane perpendicular to the direction of view (slices).
-#if !AMRTEX_CPP
-#ifndef AMRTEX_SLICES
-#error AMRTEX_SLICES must be defined: 1 where boxes are drawn as slices, 0 where rays are marched through them
-#endif
-#endif
-DEFINE_INT(AMRTEX_SLICES)
+DEFINE_INT(AMRTEX_SLICES)  // 1 where boxes are drawn as slices, 0 where rays are marched through them
 
 UNIFORM(ray_real, u_first_slice)  // units: distance of slice 0 from the eye, along the direction of view
 

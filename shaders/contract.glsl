@@ -1,52 +1,17 @@
 // The sampler contract: what an encoding provides and what is built on it, once.
 // Prose: README.md. Spaces: integer cells of the finest level ("finest"), and cell
 // widths of a region from its lower corner ("region", the q below).
-#if !AMRTEX_CPP
-#ifndef AMRTEX_FILTER
-#error AMRTEX_FILTER must be defined: one of the AMRTEX_FILTER_... below
-#endif
-#ifndef AMRTEX_HARDWARE_FILTERING
-#error AMRTEX_HARDWARE_FILTERING must be defined: 1 where the texture unit interpolates, else 0
-#endif
-#ifndef AMRTEX_POWER_OF_TWO
-#error AMRTEX_POWER_OF_TWO must be defined: 1 where all refinement ratios are powers of two, else 0
-#endif
-#ifndef AMRTEX_RATIO_SHIFT
-#error AMRTEX_RATIO_SHIFT must be defined: log2 of the refinement ratio where all levels have the same power of two, else 0
-#endif
-#ifndef AMRTEX_LEVELS
-#error AMRTEX_LEVELS must be defined: number of levels
-#endif
-#ifndef AMRTEX_FIELDS
-#error AMRTEX_FIELDS must be defined: how many fields of the mesh the structure holds
-#endif
-#ifndef AMRTEX_VALIDITY
-#error AMRTEX_VALIDITY must be defined: 1 where cells may have no value in some field, else 0
-#endif
-#ifndef AMRTEX_VALUE_RANGES
-#error AMRTEX_VALUE_RANGES must be defined: 1 where regions know their value range, else 0
-#endif
-#ifndef AMRTEX_FIELD_RANGES
-#error AMRTEX_FIELD_RANGES must be defined: 1 where fields beside the first have value ranges as well, else 0
-#endif
-#ifndef AMRTEX_SCALED_STORAGE
-#error AMRTEX_SCALED_STORAGE must be defined: 1 where texels hold (value - a) / b, else 0
-#endif
-#ifndef AMRTEX_LEVEL_OF_DETAIL
-#error AMRTEX_LEVEL_OF_DETAIL must be defined: 1 where refined cells may be drawn in place of what lies below, else 0
-#endif
-#endif
-DEFINE_INT(AMRTEX_FILTER)
-DEFINE_INT(AMRTEX_HARDWARE_FILTERING)
-DEFINE_INT(AMRTEX_POWER_OF_TWO)
-DEFINE_INT(AMRTEX_RATIO_SHIFT)
-DEFINE_INT(AMRTEX_LEVELS)
-DEFINE_INT(AMRTEX_FIELDS)
-DEFINE_INT(AMRTEX_VALIDITY)
-DEFINE_INT(AMRTEX_VALUE_RANGES)
-DEFINE_INT(AMRTEX_FIELD_RANGES)
-DEFINE_INT(AMRTEX_SCALED_STORAGE)
-DEFINE_INT(AMRTEX_LEVEL_OF_DETAIL)
+DEFINE_INT(AMRTEX_FILTER)              // one of the AMRTEX_FILTER_... below
+DEFINE_INT(AMRTEX_HARDWARE_FILTERING)  // 1 where the texture unit interpolates, else 0
+DEFINE_INT(AMRTEX_POWER_OF_TWO)        // 1 where all refinement ratios are powers of two, else 0
+DEFINE_INT(AMRTEX_RATIO_SHIFT)         // log2 of the refinement ratio where all levels have the same power of two, else 0
+DEFINE_INT(AMRTEX_LEVELS)              // number of levels
+DEFINE_INT(AMRTEX_FIELDS)              // how many fields of the mesh the structure holds
+DEFINE_INT(AMRTEX_VALIDITY)            // 1 where cells may have no value in some field, else 0
+DEFINE_INT(AMRTEX_VALUE_RANGES)        // 1 where regions know their value range, else 0
+DEFINE_INT(AMRTEX_FIELD_RANGES)        // 1 where fields beside the first have value ranges as well, else 0
+DEFINE_INT(AMRTEX_SCALED_STORAGE)      // 1 where texels hold (value - a) / b, else 0
+DEFINE_INT(AMRTEX_LEVEL_OF_DETAIL)     // 1 where refined cells may be drawn in place of what lies below, else 0
 
 // the same numbers as enum class Filter (structures/mesh/filter.hpp; tests/filter_test.cpp compares)
 #define AMRTEX_FILTER_NEAREST 0

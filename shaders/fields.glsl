@@ -2,24 +2,20 @@
 // emitted is their mean weighted by extinction,
 //   kappa = sum kappa_i(f_i),   c = sum kappa_i c_i / kappa.
 // A field adds nothing where it has no value. That of field 0 is the transfer function of one field; the others' are evaluated from their points.
-#if !AMRTEX_CPP
-#if !defined(AMRTEX_EXTINCTION_POINTS_1) || !defined(AMRTEX_COLOR_POINTS_1) || !defined(AMRTEX_LOGARITHMIC_1)
-#error AMRTEX_EXTINCTION_POINTS_1, AMRTEX_COLOR_POINTS_1 and AMRTEX_LOGARITHMIC_1 (and _2, _3) must be defined: as those without number, of further fields
-#endif
-#ifndef AMRTEX_MORE_INVISIBLE_RANGES
-#error AMRTEX_MORE_INVISIBLE_RANGES must be defined: how many intervals of values of the further fields have no extinction
-#endif
-#endif
-DEFINE_INT(AMRTEX_EXTINCTION_POINTS_1)
-DEFINE_INT(AMRTEX_EXTINCTION_POINTS_2)
-DEFINE_INT(AMRTEX_EXTINCTION_POINTS_3)
-DEFINE_INT(AMRTEX_COLOR_POINTS_1)
+DEFINE_INT(AMRTEX_EXTINCTION_POINTS_1)    // how many points extinction of field 1 has
+DEFINE_INT(AMRTEX_COLOR_POINTS_1)         // how many points colour has
+DEFINE_INT(AMRTEX_LOGARITHMIC_1)          // 1 where the points are joined over log10(value), else 0
+DEFINE_INT(AMRTEX_MORE_INVISIBLE_RANGES)  // how many intervals of values of the further fields have no extinction
+#if AMRTEX_CPP || AMRTEX_TRANSFERS > 2
+DEFINE_INT(AMRTEX_EXTINCTION_POINTS_2)  // the same of field 2
 DEFINE_INT(AMRTEX_COLOR_POINTS_2)
-DEFINE_INT(AMRTEX_COLOR_POINTS_3)
-DEFINE_INT(AMRTEX_LOGARITHMIC_1)
 DEFINE_INT(AMRTEX_LOGARITHMIC_2)
+#endif
+#if AMRTEX_CPP || AMRTEX_TRANSFERS > 3
+DEFINE_INT(AMRTEX_EXTINCTION_POINTS_3)  // the same of field 3
+DEFINE_INT(AMRTEX_COLOR_POINTS_3)
 DEFINE_INT(AMRTEX_LOGARITHMIC_3)
-DEFINE_INT(AMRTEX_MORE_INVISIBLE_RANGES)
+#endif
 
 UNIFORM_ARRAY(real, u_extinction_points_1, 3 * AMRTEX_EXTINCTION_POINTS_1, 48)
 UNIFORM_ARRAY(real, u_color_points_1, 5 * AMRTEX_COLOR_POINTS_1, 80)

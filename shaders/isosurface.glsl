@@ -1,30 +1,13 @@
 // Isosurfaces on the sampler contract: where a ray crosses one, and what it adds to the picture.
 // A hit is a change of side of f - isovalue between consecutive samples that both have a value,
 // across regions too. Entering or leaving the mesh is none.
-#if !AMRTEX_CPP
-#ifndef AMRTEX_ISOVALUES
-#error AMRTEX_ISOVALUES must be defined: how many isosurfaces are drawn; 0 leaves out what they need
+DEFINE_INT(AMRTEX_ISOVALUES)  // how many isosurfaces are drawn; 0 leaves out what they need
+#if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
+DEFINE_INT(AMRTEX_OUTPUT)               // one of the AMRTEX_OUTPUT_... below
+DEFINE_INT(AMRTEX_SHADING)              // one of the AMRTEX_SHADING_... below
+DEFINE_INT(AMRTEX_SURFACE_POINTS)       // how many points the colours over field 1 have; 0: each isovalue has its colour
+DEFINE_INT(AMRTEX_SURFACE_LOGARITHMIC)  // 1 where those points are joined over log10(value), else 0
 #endif
-#if AMRTEX_ISOVALUES > 0
-#ifndef AMRTEX_OUTPUT
-#error AMRTEX_OUTPUT must be defined: one of the AMRTEX_OUTPUT_... below
-#endif
-#ifndef AMRTEX_SHADING
-#error AMRTEX_SHADING must be defined: one of the AMRTEX_SHADING_... below
-#endif
-#ifndef AMRTEX_SURFACE_POINTS
-#error AMRTEX_SURFACE_POINTS must be defined: how many points the colours over field 1 have; 0: each isovalue has its colour
-#endif
-#ifndef AMRTEX_SURFACE_LOGARITHMIC
-#error AMRTEX_SURFACE_LOGARITHMIC must be defined: 1 where those points are joined over log10(value), else 0
-#endif
-#endif
-#endif
-DEFINE_INT(AMRTEX_ISOVALUES)
-DEFINE_INT(AMRTEX_OUTPUT)
-DEFINE_INT(AMRTEX_SHADING)
-DEFINE_INT(AMRTEX_SURFACE_POINTS)
-DEFINE_INT(AMRTEX_SURFACE_LOGARITHMIC)
 
 // the same numbers as enum class Output (renderers/scene/scene.hpp)
 #define AMRTEX_OUTPUT_COLOR 0
@@ -253,7 +236,7 @@ UNIFORM(int, u_occlusion_rays)
 UNIFORM(real, u_occlusion_radius)  // units
 
 #if !AMRTEX_CPP
-bool meets_surface(INOUT(Accumulation) a, IN(Ray) ray, IN(int) side);  // of march.glsl
+bool meets_surface(INOUT(Accumulation) a, IN(Ray) ray, IN(int) side);  // of adaptive.glsl
 #endif
 
 // Ambient occlusion: share of the rays from a hit that meet no surface within the radius. They go to the eye's side, with a

@@ -25,7 +25,7 @@
   Bound bound_##name{bindings, #name, &(name)};
 #define UNIFORM_ARRAY(T, name, count, most) \
   T name[most]{};                           \
-  Bound bound_##name{bindings, #name, &(name)[0]};
+  Bound bound_##name{bindings, #name, &(name)[0], most};
 #define VALUE_TEXTURE(name)  \
   ValueTexture<real> name{}; \
   Bound bound_##name{bindings, #name, &(name)};
@@ -160,23 +160,31 @@ class HostBuffer : public Bindable {
   const HostTexture* buffer_ = nullptr;
 };
 
+/// A member that holds numbers: scalar, vector or array.
+template <class T>
+struct Numbers {
+  T* first = nullptr;
+  int components = 1;  ///< of each element
+  int most = 1;        ///< elements that have room
+};
+
 /// Name -> member, filled by the members' own initialisers.
 struct Bindings {
-  std::map<std::string, int*> ints;
-  std::map<std::string, float*> floats;
-  std::map<std::string, double*> doubles;  ///< scalars and vectors by their first component
+  std::map<std::string, Numbers<int>> ints;
+  std::map<std::string, Numbers<float>> floats;
+  std::map<std::string, Numbers<double>> doubles;
   std::map<std::string, Bindable*> resources;
 };
 
 struct Bound {
-  Bound(Bindings& b, const char* name, int* p) { b.ints[name] = p; }
-  Bound(Bindings& b, const char* name, ivec3* p) { b.ints[name] = &p->x; }
-  Bound(Bindings& b, const char* name, float* p) { b.floats[name] = p; }
-  Bound(Bindings& b, const char* name, vec2* p) { b.floats[name] = &p->x; }
-  Bound(Bindings& b, const char* name, vec3* p) { b.floats[name] = &p->x; }
-  Bound(Bindings& b, const char* name, double* p) { b.doubles[name] = p; }
-  Bound(Bindings& b, const char* name, dvec2* p) { b.doubles[name] = &p->x; }
-  Bound(Bindings& b, const char* name, dvec3* p) { b.doubles[name] = &p->x; }
+  Bound(Bindings& b, const char* name, int* p, int most = 1) { b.ints[name] = {p, 1, most}; }
+  Bound(Bindings& b, const char* name, ivec3* p, int most = 1) { b.ints[name] = {&p->x, 3, most}; }
+  Bound(Bindings& b, const char* name, float* p, int most = 1) { b.floats[name] = {p, 1, most}; }
+  Bound(Bindings& b, const char* name, vec2* p, int most = 1) { b.floats[name] = {&p->x, 2, most}; }
+  Bound(Bindings& b, const char* name, vec3* p, int most = 1) { b.floats[name] = {&p->x, 3, most}; }
+  Bound(Bindings& b, const char* name, double* p, int most = 1) { b.doubles[name] = {p, 1, most}; }
+  Bound(Bindings& b, const char* name, dvec2* p, int most = 1) { b.doubles[name] = {&p->x, 2, most}; }
+  Bound(Bindings& b, const char* name, dvec3* p, int most = 1) { b.doubles[name] = {&p->x, 3, most}; }
   Bound(Bindings& b, const char* name, Bindable* p) { b.resources[name] = p; }
   template <class T, std::size_t n>
   Bound(Bindings& b, const char* name, ValueTexture<T> (&textures)[n]) {

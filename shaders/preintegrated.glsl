@@ -1,12 +1,7 @@
 // Light of an interval along which the transfer function's axis (the value or its log10) goes linearly from
 // one end's to the other's, with every point of both curves that lies between: no feature is too narrow.
 // Nothing is tabulated over pairs of values: between two knots extinction and colour are linear.
-#if !AMRTEX_CPP
-#ifndef AMRTEX_KNOTS
-#error AMRTEX_KNOTS must be defined: how many knots the transfer function has as uniforms; 0 for the buffer
-#endif
-#endif
-DEFINE_INT(AMRTEX_KNOTS)
+DEFINE_INT(AMRTEX_KNOTS)  // how many knots the transfer function has as uniforms; 0 for the buffer
 
 #define AMRTEX_KNOT_NUMBERS 6
 #define AMRTEX_MOST_KNOTS 34

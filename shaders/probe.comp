@@ -1,9 +1,7 @@
 // Entry point of `amrtex sample`: a field at given positions.
 #include "portable_glsl.h"
 #include "contract.glsl"
-#ifndef AMRTEX_PROBE_FIELD
-#error AMRTEX_PROBE_FIELD must be defined: number of the field to sample, below AMRTEX_FIELDS
-#endif
+DEFINE_INT(AMRTEX_PROBE_FIELD)  // number of the field to sample, below AMRTEX_FIELDS
 #if AMRTEX_PROBE_FIELD >= AMRTEX_FIELDS
 #error AMRTEX_PROBE_FIELD must be below AMRTEX_FIELDS
 #endif

@@ -12,30 +12,10 @@ UNIFORM(ray_vec3, u_draw_upper)      // finest
 UNIFORM(vec2r, u_picture_size)       // pixels
 UNIFORM(real, u_length_unit)         // world length of one unit of ray length
 
-#if !AMRTEX_CPP
-#ifndef AMRTEX_CLIP_PLANES
-#error AMRTEX_CLIP_PLANES must be defined: how many planes cut what is drawn; 0 leaves them out
-#endif
-#endif
-DEFINE_INT(AMRTEX_CLIP_PLANES)
-#if !AMRTEX_CPP
-#ifndef AMRTEX_RAY_OFFSET
-#error AMRTEX_RAY_OFFSET must be defined: 1 where the intervals of each ray are moved by a number of its own, else 0
-#endif
-#endif
-DEFINE_INT(AMRTEX_RAY_OFFSET)
-#if !AMRTEX_CPP
-#ifndef AMRTEX_MIRROR
-#error AMRTEX_MIRROR must be defined: 2 axis + 1, or + 2 for the upper face, where the drawn box is mirrored; 0 where it is not
-#endif
-#endif
-DEFINE_INT(AMRTEX_MIRROR)
-#if !AMRTEX_CPP
-#ifndef AMRTEX_OCCLUSION
-#error AMRTEX_OCCLUSION must be defined: 1 where isosurfaces take light from one another, else 0
-#endif
-#endif
-DEFINE_INT(AMRTEX_OCCLUSION)
+DEFINE_INT(AMRTEX_CLIP_PLANES)  // how many planes cut what is drawn; 0 leaves them out
+DEFINE_INT(AMRTEX_RAY_OFFSET)   // 1 where the intervals of each ray are moved by a number of its own, else 0
+DEFINE_INT(AMRTEX_MIRROR)       // 2 axis + 1, or + 2 for the upper face, where the drawn box is mirrored; 0 where it is not
+DEFINE_INT(AMRTEX_OCCLUSION)    // 1 where isosurfaces take light from one another, else 0
 #define AMRTEX_MIRROR_AXIS ((AMRTEX_MIRROR - 1) / 2)
 #define AMRTEX_MIRROR_UPPER (AMRTEX_MIRROR % 2 == 0)
 
@@ -49,6 +29,12 @@ STRUCT Ray {
   real turn;           // radians by which what is around a hit is turned; of occlusion alone
   real phase;          // intervals by which the ray's are moved; 0 without offsets
 };
+
+// 1 / v without infinities: a ray along a face, or almost along it, never ends a region through it.
+vec3r safe_inverse(IN(vec3r) v) {
+  vec3r sense = vec3r(greaterThanEqual(v, vec3r(0))) * real(2) - vec3r(1);
+  return sense / max(abs(v), vec3r(1e-20));
+}
 
 #if AMRTEX_CPP || AMRTEX_CLIP_PLANES > 0
 UNIFORM_ARRAY(ray_real, u_clip_planes, 4 * AMRTEX_CLIP_PLANES, 32)  // a, b, c, d of each: a x + b y + c z >= d is kept; finest
@@ -67,10 +53,14 @@ bool clip_ray(INOUT(Ray) ray) {
 }
 #endif
 
-#if AMRTEX_CPP || AMRTEX_RAY_OFFSET || AMRTEX_OCCLUSION
+#if AMRTEX_CPP || AMRTEX_RAY_OFFSET
 UNIFORM(int, u_ray_seed)
+#endif
+#if AMRTEX_CPP || AMRTEX_OCCLUSION
 UNIFORM(int, u_occlusion_seed)
+#endif
 
+#if AMRTEX_CPP || AMRTEX_RAY_OFFSET || AMRTEX_OCCLUSION
 // Chris Wellons' lowbias32: each bit of v changes each of the result with nearly the same chance.
 uint hash_bits(IN(uint) v) {
   uint h = (v ^ (v >> 16u)) * 0x7feb352du;

@@ -2,12 +2,7 @@
 // volume between them (Kaehler & Abel 2013, section 4). The light that arrives is
 //   ambient + (1 - ambient) exp(-depth).
 // The secondary ray is always marched adaptively: equal intervals of at most u_shadow_step cell widths in each region.
-#if !AMRTEX_CPP
-#ifndef AMRTEX_SHADOWS
-#error AMRTEX_SHADOWS must be defined: 1 where a lamp lights the volume, 0 leaves out what that needs
-#endif
-#endif
-DEFINE_INT(AMRTEX_SHADOWS)
+DEFINE_INT(AMRTEX_SHADOWS)  // 1 where a lamp lights the volume, 0 leaves out what that needs
 
 #if AMRTEX_CPP || AMRTEX_SHADOWS
 UNIFORM(ray_vec3, u_lamp)      // finest; may lie outside of the domain
@@ -17,8 +12,7 @@ UNIFORM(real, u_shadow_step)   // cell widths of the region
 #define AMRTEX_SHADOW_OPAQUE real(40)  // exp(-40) is nothing beside any other light
 
 #if !AMRTEX_CPP
-// of march.glsl
-vec3r safe_inverse(IN(vec3r) v);
+// of adaptive.glsl
 Position leave_region(IN(Ray) ray, IN(Region) r, IN(ray_real) t, IN(bvec3) through);
 #endif
 

@@ -1,24 +1,10 @@
 // Value -> emitted colour and extinction, both piecewise linear over the value or its log10.
 // Few points are evaluated as they are: exact for any spacing, and cheaper than a look-up
 // where gathers are slow. Many points come from a table of evenly spaced entries.
-#if !AMRTEX_CPP
-#ifndef AMRTEX_LOGARITHMIC
-#error AMRTEX_LOGARITHMIC must be defined: 1 where the points are joined over log10(value), else 0
-#endif
-#ifndef AMRTEX_EXTINCTION_POINTS
-#error AMRTEX_EXTINCTION_POINTS must be defined: how many points extinction has; 0 for the table
-#endif
-#ifndef AMRTEX_COLOR_POINTS
-#error AMRTEX_COLOR_POINTS must be defined: how many points colour has; 0 for the table
-#endif
-#ifndef AMRTEX_INVISIBLE_RANGES
-#error AMRTEX_INVISIBLE_RANGES must be defined: how many intervals of values have no extinction
-#endif
-#endif
-DEFINE_INT(AMRTEX_INVISIBLE_RANGES)
-DEFINE_INT(AMRTEX_LOGARITHMIC)
-DEFINE_INT(AMRTEX_EXTINCTION_POINTS)
-DEFINE_INT(AMRTEX_COLOR_POINTS)
+DEFINE_INT(AMRTEX_INVISIBLE_RANGES)   // how many intervals of values have no extinction
+DEFINE_INT(AMRTEX_LOGARITHMIC)        // 1 where the points are joined over log10(value), else 0
+DEFINE_INT(AMRTEX_EXTINCTION_POINTS)  // how many points extinction has; 0 for the table
+DEFINE_INT(AMRTEX_COLOR_POINTS)       // how many points colour has; 0 for the table
 
 #if AMRTEX_CPP || AMRTEX_INVISIBLE_RANGES > 0
 UNIFORM_ARRAY(real, u_invisible_ranges, 2 * AMRTEX_INVISIBLE_RANGES, 16)  // first and last value of each

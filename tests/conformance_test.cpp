@@ -713,13 +713,17 @@ TEST(MutationControl, AWrongLevelsWidthIsNoticed) {
           std::max_element(levels.begin(), levels.end(), [](const auto& a, const auto& b) { return a.level < b.level; })->level;
       UniformValues uniforms = field_uniforms(h, field);
       for (UniformValue& u : uniforms)
-        if (u.name == "u_level_width") std::get<std::vector<int>>(u.numbers)[static_cast<std::size_t>(used)] *= 2;
-      auto defines = field.shader.defines;  // where all ratios are 2 widths follow from the number of levels
-      for (auto& [define, value] : defines) value += define == "AMRTEX_LEVELS" ? 1 : 0;
+        if (u.name == "u_level_width") {
+          auto& widths = std::get<std::vector<int>>(u.numbers);
+          widths[static_cast<std::size_t>(used)] *= 2;
+          widths.push_back(1);
+        }
+      ShaderKey key = probe_key(field, 0);  // where all ratios are 2 widths follow from the number of levels
+      key.defines["AMRTEX_LEVELS"] = std::to_string(h.level_count() + 1);
       const auto cpu = make_cpu_field(field.encoding, Precision::double_precision);
       std::vector<const HostTexture*> textures;
       for (const HostTexture& t : field.textures) textures.push_back(&t);
-      cpu->set(defines, uniforms, textures);
+      cpu->set(key, uniforms, textures);
       bool differs = false;
       try {
         std::vector<ProbeResult> results;

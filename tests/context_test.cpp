@@ -234,18 +234,6 @@ TEST_P(ContextTest, ASyntaxErrorNamesFileAndLine) {
   EXPECT_NO_THROW(context_->check("the compiler's messages are in the exception"));
 }
 
-TEST_P(ContextTest, AMissingDefineIsACompileError) {
-  const ShaderFiles files{
-      {"test.frag", "#ifndef AMRTEX_PAGE_SIZE\n#error AMRTEX_PAGE_SIZE must be defined\n#endif\nvoid main() {}\n"}};
-  ShaderKey key;
-  key.entry = "test.frag";
-  const std::string message = error_of([&] { Program(*context_, fullscreen_vertex(), assemble_shader(key, files)); });
-  expect_contains(message, "AMRTEX_PAGE_SIZE must be defined");
-  expect_contains(message, "test.frag:2");
-  key.define("AMRTEX_PAGE_SIZE", 16);
-  EXPECT_NO_THROW(Program(*context_, fullscreen_vertex(), assemble_shader(key, files)));
-}
-
 TEST_P(ContextTest, AProgramThatDoesNotLinkIsAnError) {
   const std::string message =
       error_of([&] { picture_program(*context_, "in vec4 nobody_writes;\nout vec4 c;\nvoid main() { c = nobody_writes; }\n"); });

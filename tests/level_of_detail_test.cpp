@@ -63,12 +63,10 @@ std::vector<ProbeResult> probe(const AmrHierarchy& h, const EncodedField& field,
                                int number = 0) {
   const SceneBindings bindings = bind_scene(h, field, scene);
   const auto cpu = make_cpu_field(field.encoding, precision);
-  auto defines = bindings.defines;
-  defines.insert(defines.end(), field.shader.defines.begin(), field.shader.defines.end());
   std::vector<const HostTexture*> textures;
   for (const HostTexture& t : field.textures) textures.push_back(&t);
   for (const HostTexture& t : bindings.buffers) textures.push_back(&t);
-  cpu->set(defines, bindings.uniforms, textures);
+  cpu->set(probe_key(field, number), bindings.uniforms, textures);
   std::vector<ProbeResult> results;
   for (const FinestPosition& p : positions) results.push_back(cpu->sample(p.cell, p.fraction, number));
   return results;

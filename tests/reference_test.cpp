@@ -803,6 +803,7 @@ struct DataSet {
   const char* data;
   const char* oracle;
 };
+void PrintTo(const DataSet& d, std::ostream* out) { *out << d.data; }
 class ReferenceOracleSets : public ::testing::TestWithParam<DataSet> {};
 
 TEST_P(ReferenceOracleSets, PointSamplesAndLineIntegrals) {

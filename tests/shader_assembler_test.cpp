@@ -1,12 +1,13 @@
 // The text of a shader: order, includes, line numbers, hash. No GL here; that drivers
 // agree with the line numbers is in context_test.cpp.
-#include "renderers/gpu/shader_assembler.hpp"
+#include "renderers/bindings/shader_assembler.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdlib>
 
+#include "renderers/bindings/shader_macros.hpp"
 #include "shaders/shader_library.hpp"
 #include "structures/mesh/error.hpp"
 
@@ -83,14 +84,92 @@ TEST(ShaderAssembler, IncludesInCommentsAreNone) {
   EXPECT_EQ(error_of(key_of("a.frag"), files), "");
 }
 
-TEST(ShaderAssembler, OnceAndIfDoNotMix) {
-  // the second include would be dropped although the first one may have been switched off
-  const ShaderFiles trap{{"a.frag", "#if X\n#include \"b.glsl\"\n#endif\n#include \"b.glsl\"\n"}, {"b.glsl", "int b;\n"}};
-  EXPECT_EQ(error_of(key_of("a.frag"), trap),
-            "a.frag:4: 'b.glsl' was taken at a.frag:2 already, inside an #if that may have left it out");
-  const ShaderFiles fine{{"a.frag", "#include \"b.glsl\"\n#if X\n#include \"b.glsl\"\n#endif\n"}, {"b.glsl", "int b;\n"}};
-  EXPECT_EQ(error_of(key_of("a.frag"), fine), "");
+TEST(ShaderAssembler, TakesAFileWhereTheDefinesLeaveItIn) {
+  const ShaderFiles files{{"a.frag", "#if X\n#include \"b.glsl\"\n#endif\n#include \"b.glsl\"\n"}, {"b.glsl", "int b;\n"}};
+  for (const int x : {0, 1}) {
+    const AssembledShader shader = assemble_shader(key_of("a.frag").define("X", x), files);
+    EXPECT_EQ(count(shader.text, "int b;"), 1);
+    EXPECT_EQ(shader.text.find("int b;") < shader.text.find("#endif"), x == 1);
+  }
+  const ShaderFiles gone{{"a.frag", "#if !X\n#include \"gone.glsl\"\n#elif X > 1\n#include \"two.glsl\"\n#else\n#endif\n"}};
+  EXPECT_EQ(error_of(key_of("a.frag").define("X", 1), gone), "");
+  EXPECT_EQ(error_of(key_of("a.frag").define("X", 2), gone), "a.frag:4: no shader file 'two.glsl'");
+  EXPECT_EQ(error_of(key_of("a.frag").define("X", 0), gone), "a.frag:2: no shader file 'gone.glsl'");
+}
+
+TEST(ShaderAssembler, AnIfWithoutItsPartnersIsAnError) {
   EXPECT_EQ(error_of(key_of("a.frag"), {{"a.frag", "#ifdef X\n"}}), "a.frag: #if without #endif");
+  EXPECT_EQ(error_of(key_of("a.frag"), {{"a.frag", "\n#endif\n"}}), "a.frag:2: #endif without #if");
+  EXPECT_EQ(error_of(key_of("a.frag"), {{"a.frag", "#else\n"}}), "a.frag:1: #else without #if");
+  EXPECT_EQ(error_of(key_of("a.frag"), {{"a.frag", "#elif 1\n"}}), "a.frag:1: #elif without #if");
+}
+
+TEST(ShaderAssembler, AMissingDefineNamesFileNameAndMeaning) {
+  const ShaderFiles files{
+      {"a.frag", "#include \"b.glsl\"\n"},
+      {"b.glsl", "DEFINE_INT(AMRTEX_A)\n#if AMRTEX_A > 0\nDEFINE_INT(AMRTEX_B)  // 1 where b, else 0\n#endif\n"}};
+  EXPECT_EQ(error_of(key_of("a.frag"), files), "b.glsl:1, included from a.frag:1: AMRTEX_A is not defined");
+  EXPECT_EQ(error_of(key_of("a.frag").define("AMRTEX_A", 1), files),
+            "b.glsl:3, included from a.frag:1: AMRTEX_B is not defined: 1 where b, else 0");
+  EXPECT_EQ(error_of(key_of("a.frag").define("AMRTEX_A", 1).define("AMRTEX_B", 0), files), "");
+  EXPECT_EQ(error_of(key_of("a.frag").define("AMRTEX_A", 0), files), "") << "what an #if leaves out needs nothing";
+}
+
+TEST(ShaderAssembler, ANameInAnIfThatIsNotDefinedIsAnErrorAndNever0) {
+  EXPECT_EQ(error_of(key_of("a.frag"), {{"a.frag", "\n#if AMRTEX_X\n#endif\n"}}),
+            "a.frag:2: #if AMRTEX_X: AMRTEX_X is not defined");
+  EXPECT_EQ(error_of(key_of("a.frag"), {{"a.frag", "#if 0\n#elif 1 || AMRTEX_X\n#endif\n"}}),
+            "a.frag:2: #elif 1 || AMRTEX_X: AMRTEX_X is not defined");
+  EXPECT_EQ(error_of(key_of("a.frag"), {{"a.frag", "#if 0\n#if AMRTEX_X\n#endif\n#elif 1\n#elif AMRTEX_X\n#endif\n"}}), "");
+  EXPECT_EQ(error_of(key_of("a.frag"), {{"a.frag", "#ifndef AMRTEX_X\n#error AMRTEX_X is missing\n#endif\n"}}),
+            "a.frag:2: AMRTEX_X is missing");
+}
+
+TEST(ShaderAssembler, MacrosOfTheFilesCountInAnIf) {
+  const std::string text =
+      "#define A 2\n#define BOTH (A == 2 && \\\n  defined(KEY))\n#if BOTH\n#undef A\n#endif\n#ifdef A\n#error A is "
+      "left\n#endif\n";
+  EXPECT_EQ(error_of(key_of("a.frag").define("KEY", 0), {{"a.frag", text}}), "");
+  EXPECT_EQ(error_of(key_of("a.frag"), {{"a.frag", text}}), "a.frag:8: A is left");
+  EXPECT_EQ(error_of(key_of("a.frag"), {{"a.frag", "#define F(x) x\n#if F(1)\n#endif\n"}}),
+            "a.frag:2: #if F(1): F takes arguments, which an #if cannot give it");
+  EXPECT_EQ(error_of(key_of("a.frag"), {{"a.frag", "#define A (A)\n#if A\n#endif\n"}}),
+            "a.frag:2: #if A: A is defined through itself");
+}
+
+TEST(ShaderMacros, EvaluatesExpressionsAsCDoes) {
+  ShaderMacros macros;
+  macros.define("TWO", "2");
+  macros.define("SUM 1 + TWO");
+  const std::vector<std::pair<const char*, int>> cases{
+      {"1 + 2 * 3", 7},        {"(1 + 2) * 3", 9},    {"10 - 4 - 3", 3},       {"7 / 2 + 7 % 2", 4},
+      {"1 << 4 >> 1", 8},      {"!0 && 3", 1},        {"0 || !5", 0},          {"1 < 2 == 2 >= 2", 1},
+      {"-3 < 0 && +3 > 0", 1}, {"0x10u == 16", 1},    {"SUM * TWO", 5},        {"2 * SUM", 4},
+      {"defined TWO", 1},      {"defined(THREE)", 0}, {"1 != 1 || 2 <= 1", 0}, {"TWO*3-defined(TWO)", 5}};
+  for (const auto& [expression, value] : cases) EXPECT_EQ(macros.evaluate(expression), value) << expression;
+}
+
+TEST(ShaderMacros, RefusesWhatIsNoExpression) {
+  const ShaderMacros macros;
+  for (const char* expression : {"", "1 +", "(1", "1)", "1 2", "real(1)", "1 / 0", "1 % 0", "1 << 40", "0.5", "5000000000",
+                                 "defined", "2147483647 + 1", "1 ? 2", "defined("})
+    EXPECT_THROW(macros.evaluate(expression), Error) << expression;
+}
+
+TEST(ShaderAssembler, TellsWhatTheHostHasToProvide) {
+  const ShaderFiles files{
+      {"a.frag",
+       "DEFINE_INT(N)\nUNIFORM(real, u_a)  // a (b)\n#if N > 2\nUNIFORM(int, u_out)\n#endif\n"
+       "UNIFORM_ARRAY(vec2r, u_array, 2 * N, 16)\nVALUE_TEXTURES(tex_v, N, 4)\n  BUFFER(uint, words, words_block)\n"
+       "INTEGER_TEXTURE(tex_i)\nVALUE_TEXTURE(tex_w)\nVALUE_TEXTURE_SET(tex_s, handles, handles_block)\n"
+       "// UNIFORM(int, u_comment)\n"}};
+  const AssembledShader shader = assemble_shader(key_of("a.frag").define("N", 2), files);
+  std::vector<std::string> uniforms;
+  for (const ShaderInput& i : shader.uniforms) uniforms.push_back(i.name + " " + std::to_string(i.count) + " " + i.place);
+  EXPECT_EQ(uniforms, (std::vector<std::string>{"u_a 1 a.frag:2", "u_array 4 a.frag:6"}));
+  std::vector<std::string> resources;
+  for (const ShaderInput& i : shader.resources) resources.push_back(i.name);
+  EXPECT_EQ(resources, (std::vector<std::string>{"tex_v", "tex_v[1]", "words", "tex_i", "tex_w", "tex_s"}));
 }
 
 TEST(ShaderAssembler, OtherIncludesSayWhatIsExpected) {

@@ -116,6 +116,24 @@ UniformValues field_uniforms(const DomainGeometry& geometry, const EncodedField&
   return std::move(b.uniforms);
 }
 
+ShaderKey probe_key(const EncodedField& field, int number) {
+  ShaderKey key;
+  key.entry = "probe.comp";
+  return key.use(field.shader).define("AMRTEX_RAY_DOUBLE", 0).define("AMRTEX_PROBE_FIELD", number);
+}
+
+ShaderKey scene_key(const std::string& entry, const EncodedField& field, const SceneBindings& bindings, bool counting) {
+  ShaderKey key;
+  key.entry = entry;
+  key.use(field.shader);
+  for (const auto& [name, value] : bindings.defines) key.define(name, value);
+  return key.define("AMRTEX_COUNT", counting ? 1 : 0);
+}
+
+const char* raycast_entry(const Scene& scene) {
+  return scene.settings.triangles.empty() ? "raycast.frag" : "raycast_triangles.frag";
+}
+
 SceneBindings bind_scene(const DomainGeometry& geometry, const EncodedField& field, const Scene& scene) {
   const RenderSettings& s = scene.settings;
   check_sampling(geometry, scene);

@@ -136,6 +136,9 @@ void add_transfer_function(const DomainGeometry& geometry, const Scene& scene, S
       add_table(tf, per_unit, b);
     for (const auto& range : invisible_ranges(tf)) invisible.insert(invisible.end(), range.begin(), range.end());
     if (!invisible.empty()) b.set("u_invisible_ranges", invisible);
+  } else {
+    b.set("u_extinction_points", std::vector<double>(3));
+    b.set("u_color_points", std::vector<double>(5));
   }
   b.define("AMRTEX_LOGARITHMIC", drawn && tf.logarithmic ? 1 : 0);
   b.define("AMRTEX_EXTINCTION_POINTS", extinction_points);

@@ -25,10 +25,7 @@ std::vector<ProbeResult> probe_on_gl(Context& context, const DomainGeometry& geo
     cells.emplace_back(p.cell, 0);
     fractions.emplace_back(Vec3f(p.fraction), 0.0F);
   }
-  ShaderKey key;
-  key.entry = "probe.comp";
-  key.use(field.shader).define("AMRTEX_RAY_DOUBLE", 0).define("AMRTEX_PROBE_FIELD", number);
-  Program program(context, assemble_shader(key));
+  Program program(context, assemble_shader(probe_key(field, number)));
   const GlBuffer cell_buffer = upload(context, cells);
   const GlBuffer fraction_buffer = upload(context, fractions);
   std::vector<glm::vec4> values(points.size());
@@ -55,7 +52,8 @@ std::vector<ProbeResult> probe_on_cpu(const DomainGeometry& geometry, const Enco
   const auto cpu = make_cpu_field(field.encoding, precision);
   std::vector<const HostTexture*> textures;
   for (const HostTexture& t : field.textures) textures.push_back(&t);
-  cpu->set(field.shader.defines, field_uniforms(geometry, field), textures);
+  field.scale_of(number);  // refuses a number that the text could not index
+  cpu->set(probe_key(field, number), field_uniforms(geometry, field), textures);
   std::vector<ProbeResult> results;
   for (const FinestPosition& p : points) results.push_back(cpu->sample(p.cell, p.fraction, number));
   return results;

@@ -16,8 +16,7 @@ Raycaster::Raycaster(Context& context, const DomainGeometry& geometry, const Str
 Program Raycaster::make_program(bool counting) const {
   ShaderKey vertex;
   vertex.entry = "fullscreen.vert";
-  const char* entry = scene_.settings.triangles.empty() ? "raycast.frag" : "raycast_triangles.frag";
-  return {*context_, assemble_shader(vertex), assemble_shader(resources_.shader_key(entry, counting))};
+  return {*context_, assemble_shader(vertex), assemble_shader(resources_.shader_key(raycast_entry(scene_), counting))};
 }
 
 FrameTime Raycaster::draw() {

@@ -26,15 +26,6 @@ SceneResources::SceneResources(Context& context, const DomainGeometry& geometry,
   for (const HostTexture& b : bindings_.buffers) buffers_.push_back(upload(context, b));
 }
 
-ShaderKey SceneResources::shader_key(const std::string& entry, bool counting) const {
-  ShaderKey key;
-  key.entry = entry;
-  key.use(field_->shader);
-  for (const auto& [name, value] : bindings_.defines) key.define(name, value);
-  key.define("AMRTEX_COUNT", counting ? 1 : 0);
-  return key;
-}
-
 void SceneResources::bind(Program& program, const GpuField& gpu) const {
   program.use();
   for (const UniformValue& u : bindings_.uniforms) program.set_optional(u);

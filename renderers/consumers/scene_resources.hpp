@@ -8,7 +8,6 @@
 #include "renderers/gpu/gl_objects.hpp"
 #include "renderers/gpu/gpu_field.hpp"
 #include "renderers/gpu/program.hpp"
-#include "renderers/gpu/shader_assembler.hpp"
 
 namespace amrtex {
 
@@ -17,8 +16,7 @@ class SceneResources {
   /// `field` must outlive the object.
   SceneResources(Context& context, const DomainGeometry& geometry, const EncodedField& field, const Scene& scene);
 
-  /// Entry file with the defines of field and scene.
-  ShaderKey shader_key(const std::string& entry, bool counting) const;
+  ShaderKey shader_key(const std::string& entry, bool counting) const { return scene_key(entry, *field_, bindings_, counting); }
   /// Uses the program, sets what the scene tells it and binds the field.
   void bind(Program& program, const GpuField& gpu) const;
   /// Storage buffers of field and scene.

@@ -4,6 +4,7 @@
 #include <array>
 #include <memory>
 
+#include "renderers/bindings/shader_assembler.hpp"
 #include "renderers/bindings/uniforms.hpp"
 #include "renderers/scene/picture.hpp"
 #include "renderers/scene/scene.hpp"
@@ -28,10 +29,9 @@ struct FieldRegion {
 class CpuField {
  public:
   virtual ~CpuField() = default;
-  /// Binds defines, uniforms and host data by name; throws Error naming what the text
-  /// declares and nobody provides. The texture's data must outlive this object.
-  virtual void set(const std::vector<std::pair<std::string, int>>& defines, const UniformValues& uniforms,
-                   const std::vector<const HostTexture*>& textures) = 0;
+  /// Binds defines, uniforms and host data by name. `key`: that of the GLSL shader whose work is to be done. Throws Error naming
+  /// what that shader's text declares and nobody provides. The textures' data must outlive this object.
+  virtual void set(const ShaderKey& key, const UniformValues& uniforms, const std::vector<const HostTexture*>& textures) = 0;
   /// Field number `field`; throws UsageError where there are not so many.
   virtual ProbeResult sample(const Vec3i& finest_cell, const Vec3d& fraction, int field = 0) const = 0;
   /// What locate() answers at the lower corner of a cell of the finest level.

@@ -15,12 +15,10 @@ Picture render_on_cpu(const DomainGeometry& geometry, const EncodedField& field,
 
 Picture trace_on_cpu(CpuField& cpu, const DomainGeometry& geometry, const EncodedField& field, const Scene& scene) {
   const SceneBindings bindings = bind_scene(geometry, field, scene);
-  auto defines = bindings.defines;
-  defines.insert(defines.end(), field.shader.defines.begin(), field.shader.defines.end());
   std::vector<const HostTexture*> textures;
   for (const HostTexture& t : field.textures) textures.push_back(&t);
   for (const HostTexture& t : bindings.buffers) textures.push_back(&t);
-  cpu.set(defines, bindings.uniforms, textures);
+  cpu.set(scene_key(raycast_entry(scene), field, bindings, false), bindings.uniforms, textures);
   const RenderSettings& s = scene.settings;
   Picture picture(s.width, s.height, s.picture_channels());
   tbb::parallel_for(0, s.height, [&](int y) {

@@ -3,9 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <set>
-
 #include "renderers/cpu/cpu_field.hpp"
+#include "renderers/cpu/cpu_inputs.hpp"
 #include "shaders/portable_cpp.hpp"
 
 namespace amrtex {
@@ -13,15 +12,8 @@ namespace amrtex {
 template <class Shader, class real>
 class CpuShader final : public CpuField {
  public:
-  void set(const std::vector<std::pair<std::string, int>>& defines, const UniformValues& uniforms,
-           const std::vector<const HostTexture*>& textures) override {
-    for (const auto& [name, member] : shader_.bindings.ints)
-      if (name.starts_with("AMRTEX_")) *member = 0;  // as no part of the text that the scene leaves out
-    for (const auto& [name, value] : defines)
-      if (auto it = shader_.bindings.ints.find(name); it != shader_.bindings.ints.end()) *it->second = value;
-    for (const UniformValue& u : uniforms) set_uniform(u);
-    for (const HostTexture* t : textures)
-      if (auto it = shader_.bindings.resources.find(t->name); it != shader_.bindings.resources.end()) it->second->bind(*t);
+  void set(const ShaderKey& key, const UniformValues& uniforms, const std::vector<const HostTexture*>& textures) override {
+    set_inputs(shader_.bindings, key, uniforms, textures);
   }
 
   ProbeResult sample(const Vec3i& finest_cell, const Vec3d& fraction, int field) const override {
@@ -65,19 +57,6 @@ class CpuShader final : public CpuField {
  private:
   // GLSL knows no const functions; none of its functions writes to a uniform
   Shader& text() const { return const_cast<Shader&>(shader_); }
-
-  void set_uniform(const UniformValue& u) {
-    if (const auto* ints = std::get_if<std::vector<int>>(&u.numbers)) {
-      if (auto it = shader_.bindings.ints.find(u.name); it != shader_.bindings.ints.end())
-        std::copy(ints->begin(), ints->end(), it->second);
-      return;
-    }
-    const auto& reals = std::get<std::vector<double>>(u.numbers);
-    if (auto it = shader_.bindings.doubles.find(u.name); it != shader_.bindings.doubles.end())
-      std::copy(reals.begin(), reals.end(), it->second);
-    if (auto it = shader_.bindings.floats.find(u.name); it != shader_.bindings.floats.end())
-      std::transform(reals.begin(), reals.end(), it->second, [](double v) { return static_cast<float>(v); });
-  }
 
   Shader shader_;
 };

@@ -41,7 +41,7 @@ std::vector<FieldRegion> list_regions(const DomainGeometry& geometry, const Enco
   const auto cpu = make_cpu_field(field.encoding, Precision::double_precision);
   std::vector<const HostTexture*> textures;
   for (const HostTexture& t : field.textures) textures.push_back(&t);
-  cpu->set(field.shader.defines, field_uniforms(geometry, field), textures);
+  cpu->set(probe_key(field, 0), field_uniforms(geometry, field), textures);
   std::vector<FieldRegion> regions;
   std::vector<bool> seen(static_cast<std::size_t>(domain.cells()));
   for_each_cell(domain, [&](const Vec3i& cell) {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "renderers/gpu/gl_objects.hpp"
-#include "renderers/gpu/shader_assembler.hpp"
+#include "renderers/bindings/shader_assembler.hpp"
 #include "renderers/bindings/uniforms.hpp"
 
 namespace amrtex {

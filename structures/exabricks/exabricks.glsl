@@ -1,42 +1,16 @@
 // exabricks: regions that know the cells whose hats reach into them. Words: exabricks_layout.h.
 #include "exabricks/exabricks_layout.h"
-#if !AMRTEX_CPP
-#ifndef AMRTEX_EXA_DEPTH
-#error AMRTEX_EXA_DEPTH must be defined: splits from where a descent starts to the deepest leaf, or nodes of the BVH
-#endif
-#ifndef AMRTEX_EXA_GRID
-#error AMRTEX_EXA_GRID must be defined: 1 where descents start from a grid, else 0
-#endif
-#ifndef AMRTEX_EXA_BVH
-#error AMRTEX_EXA_BVH must be defined: 1 where regions are found through a BVH, 0 where through the tree of planes
-#endif
-#ifndef AMRTEX_EXA_CELLS
-#error AMRTEX_EXA_CELLS must be defined: 1 where each sample searches its cells, 0 where its region knows them
-#endif
-#ifndef AMRTEX_EXA_BORDER
-#error AMRTEX_EXA_BORDER must be defined: texels around a brick
-#endif
-#ifndef AMRTEX_EXA_MISSING
-#error AMRTEX_EXA_MISSING must be defined: 1 where bricks hold cells without value, else 0
-#endif
-#ifndef AMRTEX_EXA_X_BITS
-#error AMRTEX_EXA_X_BITS and AMRTEX_EXA_Y_BITS must be defined: bits of x and y in a packed texel
-#endif
-#ifndef AMRTEX_POOL_X
-#error AMRTEX_POOL_X, _Y and _Z must be defined: texels of the pool along each axis
-#endif
-#endif
-DEFINE_INT(AMRTEX_EXA_DEPTH)
-DEFINE_INT(AMRTEX_EXA_GRID)
-DEFINE_INT(AMRTEX_EXA_BVH)
-DEFINE_INT(AMRTEX_EXA_CELLS)
-DEFINE_INT(AMRTEX_EXA_BORDER)
-DEFINE_INT(AMRTEX_EXA_MISSING)
-DEFINE_INT(AMRTEX_EXA_X_BITS)
-DEFINE_INT(AMRTEX_EXA_Y_BITS)
-DEFINE_INT(AMRTEX_POOL_X)
-DEFINE_INT(AMRTEX_POOL_Y)
-DEFINE_INT(AMRTEX_POOL_Z)
+DEFINE_INT(AMRTEX_EXA_DEPTH)    // splits from where a descent starts to the deepest leaf, or nodes of the BVH
+DEFINE_INT(AMRTEX_EXA_GRID)     // 1 where descents start from a grid, else 0
+DEFINE_INT(AMRTEX_EXA_BVH)      // 1 where regions are found through a BVH, 0 where through the tree of planes
+DEFINE_INT(AMRTEX_EXA_CELLS)    // 1 where each sample searches its cells, 0 where its region knows them
+DEFINE_INT(AMRTEX_EXA_BORDER)   // texels around a brick
+DEFINE_INT(AMRTEX_EXA_MISSING)  // 1 where bricks hold cells without value, else 0
+DEFINE_INT(AMRTEX_EXA_X_BITS)   // bits of x in a packed texel
+DEFINE_INT(AMRTEX_EXA_Y_BITS)   // bits of y
+DEFINE_INT(AMRTEX_POOL_X)       // texels of the pool along x
+DEFINE_INT(AMRTEX_POOL_Y)       // along y
+DEFINE_INT(AMRTEX_POOL_Z)       // along z
 
 BUFFER(uvec4, exa_regions, exa_regions_block)  // two a region
 #if AMRTEX_CPP || AMRTEX_VALUE_RANGES

@@ -1,46 +1,13 @@
 // kd_tree: a descent a region, one filtered fetch a sample and field, from the pool or from the brick's own texture; with the filter basis each
 // sample searches the leaves whose cells' hats reach it. Words: kd_tree_layout.h.
 #include "kd_tree/kd_tree_layout.h"
-#if !AMRTEX_CPP
-#ifndef AMRTEX_KD_DEPTH
-#error AMRTEX_KD_DEPTH must be defined: splits from where a descent starts to the deepest leaf
-#endif
-#ifndef AMRTEX_KD_GRID
-#error AMRTEX_KD_GRID must be defined: 1 where descents start from a grid, 0 where from the root
-#endif
-#ifndef AMRTEX_KD_VERTICES
-#error AMRTEX_KD_VERTICES must be defined: 1 where texels are vertices, 0 where they are cells
-#endif
-#ifndef AMRTEX_KD_DATA_WORDS
-#error AMRTEX_KD_DATA_WORDS must be defined: words of a data node
-#endif
-#ifndef AMRTEX_KD_X_BITS
-#error AMRTEX_KD_X_BITS and AMRTEX_KD_Y_BITS must be defined: bits of x and y in a packed position
-#endif
-#ifndef AMRTEX_KD_BINDLESS
-#error AMRTEX_KD_BINDLESS must be defined: 1 where each brick has its own texture, 0 where all are in the pool
-#endif
-#if AMRTEX_KD_BINDLESS
-#ifndef AMRTEX_HANDLE_TURNS
-#error AMRTEX_HANDLE_TURNS must be defined: handles that invocations which run together may hold, 1 where a fetch takes different ones
-#endif
-#else
-#ifndef AMRTEX_POOL_X
-#error AMRTEX_POOL_X, _Y and _Z must be defined: texels of the pool along each axis
-#endif
-#endif
-#endif
-DEFINE_INT(AMRTEX_KD_DEPTH)
-DEFINE_INT(AMRTEX_KD_GRID)
-DEFINE_INT(AMRTEX_KD_VERTICES)
-DEFINE_INT(AMRTEX_KD_DATA_WORDS)
-DEFINE_INT(AMRTEX_KD_X_BITS)
-DEFINE_INT(AMRTEX_KD_Y_BITS)
-DEFINE_INT(AMRTEX_KD_BINDLESS)
-DEFINE_INT(AMRTEX_HANDLE_TURNS)
-DEFINE_INT(AMRTEX_POOL_X)
-DEFINE_INT(AMRTEX_POOL_Y)
-DEFINE_INT(AMRTEX_POOL_Z)
+DEFINE_INT(AMRTEX_KD_DEPTH)       // splits from where a descent starts to the deepest leaf
+DEFINE_INT(AMRTEX_KD_GRID)        // 1 where descents start from a grid, 0 where from the root
+DEFINE_INT(AMRTEX_KD_VERTICES)    // 1 where texels are vertices, 0 where they are cells
+DEFINE_INT(AMRTEX_KD_DATA_WORDS)  // words of a data node
+DEFINE_INT(AMRTEX_KD_X_BITS)      // bits of x in a packed position
+DEFINE_INT(AMRTEX_KD_Y_BITS)      // bits of y
+DEFINE_INT(AMRTEX_KD_BINDLESS)    // 1 where each brick has its own texture, 0 where all are in the pool
 
 BUFFER(uvec2, kd_nodes, kd_nodes_block)
 BUFFER(uint, kd_data, kd_data_block)
@@ -51,9 +18,13 @@ UNIFORM(ivec3, u_kd_grid)                            // cells of the grid
 UNIFORM(ivec3, u_kd_grid_width)                      // x: width of a cell of the grid, finest cells
 #endif
 #if AMRTEX_CPP || !AMRTEX_KD_BINDLESS
+DEFINE_INT(AMRTEX_POOL_X)  // texels of the pool along x
+DEFINE_INT(AMRTEX_POOL_Y)  // along y
+DEFINE_INT(AMRTEX_POOL_Z)  // along z
 VALUE_TEXTURES(tex_kd_pool, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)
 #endif
 #if AMRTEX_CPP || AMRTEX_KD_BINDLESS
+DEFINE_INT(AMRTEX_HANDLE_TURNS)  // handles that invocations which run together may hold, 1 where a fetch takes different ones
 VALUE_TEXTURE_SET(tex_kd_bricks, kd_handles, kd_handles_block)  // AMRTEX_FIELDS textures a brick
 #endif
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING && AMRTEX_KD_BINDLESS

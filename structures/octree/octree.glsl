@@ -1,47 +1,15 @@
 // octree: regions are leaf cells, found by a descent from the root or from a dense start grid. Words: octree_layout.h.
 #include "octree/octree_layout.h"
-#if !AMRTEX_CPP
-#ifndef AMRTEX_OCTREE_LAYOUT
-#error AMRTEX_OCTREE_LAYOUT must be defined: AMRTEX_OCTREE_WIDE or AMRTEX_OCTREE_RGBA8
-#endif
-#ifndef AMRTEX_OCTREE_TRAVERSAL
-#error AMRTEX_OCTREE_TRAVERSAL must be defined: AMRTEX_OCTREE_FAST or AMRTEX_OCTREE_PAPER
-#endif
-#ifndef AMRTEX_OCTREE_NODE_BUFFER
-#error AMRTEX_OCTREE_NODE_BUFFER must be defined: 1 where nodes stand in a buffer, 0 where in a 3D texture
-#endif
-#ifndef AMRTEX_OCTREE_VALUE_BUFFER
-#error AMRTEX_OCTREE_VALUE_BUFFER must be defined: 1 where values stand in a buffer, 0 where in a 3D texture
-#endif
-#ifndef AMRTEX_OCTREE_LOD
-#error AMRTEX_OCTREE_LOD must be defined: 1 where averages stand in a LOD texture of their own
-#endif
-#ifndef AMRTEX_OCTREE_START
-#error AMRTEX_OCTREE_START must be defined: 1 where there is a start grid, else 0
-#endif
-#ifndef AMRTEX_OCTREE_START_SHIFT
-#error AMRTEX_OCTREE_START_SHIFT must be defined: depths from the cells where a descent starts to level 0
-#endif
-#ifndef AMRTEX_OCTREE_GHOSTS
-#error AMRTEX_OCTREE_GHOSTS must be defined: 1 where missing neighbours stand in the tree, 0 where there are none
-#endif
-#ifndef AMRTEX_OCTREE_PRUNED
-#error AMRTEX_OCTREE_PRUNED must be defined: 1 where nodes that show nothing are not stored, else 0
-#endif
-#ifndef AMRTEX_OCTREE_GRADIENTS
-#error AMRTEX_OCTREE_GRADIENTS must be defined: 1 where leaves hold the direction of their gradient, else 0
-#endif
-#endif
-DEFINE_INT(AMRTEX_OCTREE_GRADIENTS)
-DEFINE_INT(AMRTEX_OCTREE_LAYOUT)
-DEFINE_INT(AMRTEX_OCTREE_TRAVERSAL)
-DEFINE_INT(AMRTEX_OCTREE_NODE_BUFFER)
-DEFINE_INT(AMRTEX_OCTREE_VALUE_BUFFER)
-DEFINE_INT(AMRTEX_OCTREE_LOD)
-DEFINE_INT(AMRTEX_OCTREE_START)
-DEFINE_INT(AMRTEX_OCTREE_START_SHIFT)
-DEFINE_INT(AMRTEX_OCTREE_GHOSTS)
-DEFINE_INT(AMRTEX_OCTREE_PRUNED)
+DEFINE_INT(AMRTEX_OCTREE_GRADIENTS)     // 1 where leaves hold the direction of their gradient, else 0
+DEFINE_INT(AMRTEX_OCTREE_LAYOUT)        // AMRTEX_OCTREE_WIDE or AMRTEX_OCTREE_RGBA8
+DEFINE_INT(AMRTEX_OCTREE_TRAVERSAL)     // AMRTEX_OCTREE_FAST or AMRTEX_OCTREE_PAPER
+DEFINE_INT(AMRTEX_OCTREE_NODE_BUFFER)   // 1 where nodes stand in a buffer, 0 where in a 3D texture
+DEFINE_INT(AMRTEX_OCTREE_VALUE_BUFFER)  // 1 where values stand in a buffer, 0 where in a 3D texture
+DEFINE_INT(AMRTEX_OCTREE_LOD)           // 1 where averages stand in a LOD texture of their own
+DEFINE_INT(AMRTEX_OCTREE_START)         // 1 where there is a start grid, else 0
+DEFINE_INT(AMRTEX_OCTREE_START_SHIFT)   // depths from the cells where a descent starts to level 0
+DEFINE_INT(AMRTEX_OCTREE_GHOSTS)        // 1 where missing neighbours stand in the tree, 0 where there are none
+DEFINE_INT(AMRTEX_OCTREE_PRUNED)        // 1 where nodes that show nothing are not stored, else 0
 
 // slots may hold no cell, one without a value, or one that shows nothing
 #define AMRTEX_OCTREE_EMPTY_SLOTS (AMRTEX_VALIDITY != 0 || AMRTEX_OCTREE_PRUNED != 0)

@@ -186,7 +186,13 @@ TEST_P(OctreeFilter, IsTheReferenceForEveryRatioAndShape) {
 
 INSTANTIATE_TEST_SUITE_P(Traversals, OctreeFilter,
                          testing::Values(Json::object(), Json{{"start_grid", 0}}, Json{{"start_grid", 2}},
-                                         Json{{"traversal", "paper"}}));
+                                         Json{{"traversal", "paper"}}),
+                         [](const auto& test) {
+                           std::string name = test.param.empty() ? "defaults" : "";
+                           for (const auto& [parameter, value] : test.param.items())
+                             name += parameter + "_" + (value.is_string() ? value.template get<std::string>() : value.dump());
+                           return name;
+                         });
 
 TEST(Octree, TheLayoutOfThePaperHoldsTheFieldInEightBits) {
   // half a step of 1/255 of the range

@@ -1,37 +1,14 @@
 // page_table: one or two table look-ups a region, one filtered fetch a sample and field.
 #include "page_table/page_table_layout.h"
-#if !AMRTEX_CPP
-#ifndef AMRTEX_PAGE_SIZE
-#error AMRTEX_PAGE_SIZE must be defined: cells along the edge of a page, a power of two
-#endif
-#ifndef AMRTEX_PAGE_BORDER
-#error AMRTEX_PAGE_BORDER must be defined: texels between the lower face of a page and its first value
-#endif
-#ifndef AMRTEX_PAGE_EDGE
-#error AMRTEX_PAGE_EDGE must be defined: texels along the edge of a stored page
-#endif
-#ifndef AMRTEX_PAGE_NODES
-#error AMRTEX_PAGE_NODES must be defined: 1 where texels are vertices, 0 where they are cells
-#endif
-#ifndef AMRTEX_PAGE_CONSTANTS
-#error AMRTEX_PAGE_CONSTANTS must be defined: 1 where constant pages exist, else 0
-#endif
-#ifndef AMRTEX_POOL_X
-#error AMRTEX_POOL_X, _Y and _Z must be defined: texels of the pool along each axis
-#endif
-#ifndef AMRTEX_PAGE_TABLE_LEVELS
-#error AMRTEX_PAGE_TABLE_LEVELS must be defined: 1 or 2
-#endif
-#endif
-DEFINE_INT(AMRTEX_PAGE_SIZE)
-DEFINE_INT(AMRTEX_PAGE_BORDER)
-DEFINE_INT(AMRTEX_PAGE_EDGE)
-DEFINE_INT(AMRTEX_PAGE_NODES)
-DEFINE_INT(AMRTEX_PAGE_CONSTANTS)
-DEFINE_INT(AMRTEX_PAGE_TABLE_LEVELS)
-DEFINE_INT(AMRTEX_POOL_X)
-DEFINE_INT(AMRTEX_POOL_Y)
-DEFINE_INT(AMRTEX_POOL_Z)
+DEFINE_INT(AMRTEX_PAGE_SIZE)          // cells along the edge of a page, a power of two
+DEFINE_INT(AMRTEX_PAGE_BORDER)        // texels between the lower face of a page and its first value
+DEFINE_INT(AMRTEX_PAGE_EDGE)          // texels along the edge of a stored page
+DEFINE_INT(AMRTEX_PAGE_NODES)         // 1 where texels are vertices, 0 where they are cells
+DEFINE_INT(AMRTEX_PAGE_CONSTANTS)     // 1 where constant pages exist, else 0
+DEFINE_INT(AMRTEX_PAGE_TABLE_LEVELS)  // 1 or 2
+DEFINE_INT(AMRTEX_POOL_X)             // texels of the pool along x
+DEFINE_INT(AMRTEX_POOL_Y)             // along y
+DEFINE_INT(AMRTEX_POOL_Z)             // along z
 
 INTEGER_TEXTURE(tex_page_table)
 #if AMRTEX_CPP || AMRTEX_PAGE_TABLE_LEVELS == 2

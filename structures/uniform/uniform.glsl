@@ -1,19 +1,8 @@
 // uniform: locate() is arithmetic, fetch_value() one fetch of a dense texture.
 #include "uniform/uniform_layout.h"
-#if !AMRTEX_CPP
-#ifndef AMRTEX_DENSE_LEVEL
-#error AMRTEX_DENSE_LEVEL must be defined: the level that the texture holds
-#endif
-#ifndef AMRTEX_DENSE_BORDER
-#error AMRTEX_DENSE_BORDER must be defined: 1 where the texture holds the cells round the domain, else 0
-#endif
-#ifndef AMRTEX_DENSE_VERTICES
-#error AMRTEX_DENSE_VERTICES must be defined: 1 where texels are vertices, 0 where they are cells
-#endif
-#endif
-DEFINE_INT(AMRTEX_DENSE_LEVEL)
-DEFINE_INT(AMRTEX_DENSE_BORDER)
-DEFINE_INT(AMRTEX_DENSE_VERTICES)
+DEFINE_INT(AMRTEX_DENSE_LEVEL)     // the level that the texture holds
+DEFINE_INT(AMRTEX_DENSE_BORDER)    // 1 where the texture holds the cells round the domain, else 0
+DEFINE_INT(AMRTEX_DENSE_VERTICES)  // 1 where texels are vertices, 0 where they are cells
 
 VALUE_TEXTURES(tex_dense, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)
 UNIFORM(ivec3, u_dense_cells)   // cells of the level

@@ -1,6 +1,6 @@
 // example_encoding: from the finest level up, the brick that would hold the position is looked up in a hash table.
 #include "example_encoding/example_encoding_layout.h"
-DEFINE_INT(AMRTEX_HASHED_BORDER)
+DEFINE_INT(AMRTEX_HASHED_BORDER)  // texels between a brick's face and its neighbour's in the pool
 
 VALUE_TEXTURES(tex_hashed, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)
 UNIFORM(ivec3, u_hashed_table)  // x: entries, a power of two; y: entries that a search reads at most

@@ -1,5 +1,5 @@
-// From a key to the text of one shader: version, extensions, defines, and files
-// with their includes resolved. Pure functions; nothing here knows GL.
+// From a key to the text of one shader: version, extensions, defines, and files with their includes resolved; and what that
+// text needs. Pure functions; nothing here knows GL.
 #pragma once
 
 #include <map>
@@ -25,18 +25,27 @@ struct ShaderKey {
   ShaderKey& use(const ShaderPart& part);
 };
 
+/// A uniform, texture or buffer that a text declares with the macros of portable_glsl.h.
+struct ShaderInput {
+  std::string name;
+  std::string place;  ///< "march.glsl:12"
+  int count = 1;      ///< elements of an array of uniforms
+};
+
 struct AssembledShader {
   std::string text;
-  std::vector<std::string> files;  ///< index = second number of `#line`; 0 is the part before the entry file
-  std::string hash;                ///< of the text, 32 hexadecimal digits
+  std::vector<std::string> files;      ///< index = second number of `#line`; 0 is the part before the entry file
+  std::string hash;                    ///< of the text, 32 hexadecimal digits
+  std::vector<ShaderInput> uniforms;   ///< what the host has to set, ...
+  std::vector<ShaderInput> resources;  ///< ... and to bind
 };
 
 /// path -> text
 using ShaderFiles = std::map<std::string, std::string, std::less<>>;
 
-/// Includes are resolved in the embedded library. Each file is taken once; throws
-/// Error naming file, line and chain of includes for a missing file, a cycle, and a
-/// file that `#if` may have left out where it is included again.
+/// Includes are resolved in the embedded library; each file is taken once, and not where an #if leaves it out. Throws Error
+/// naming file, line and chain of includes for a missing file, a cycle, an active #error, a define of DEFINE_INT that the key
+/// does not have, and a name in an #if that is not defined.
 AssembledShader assemble_shader(const ShaderKey& key);
 AssembledShader assemble_shader(const ShaderKey& key, const ShaderFiles& files);
 

@@ -1,4 +1,4 @@
-#include "renderers/gpu/shader_assembler.hpp"
+#include "renderers/bindings/shader_assembler.hpp"
 
 #include <fmt/format.h>
 #include <xxhash.h>
@@ -9,7 +9,9 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <set>
 
+#include "renderers/bindings/shader_macros.hpp"
 #include "shaders/shader_library.hpp"
 #include "structures/mesh/error.hpp"
 
@@ -39,6 +41,37 @@ Directive parse_directive(std::string_view line) {
   return {line.substr(0, n), trimmed(line.substr(n))};
 }
 
+/// NAME(a, b, ...) at the start of a line, with up to three arguments.
+struct Declaration {
+  std::string_view macro;
+  std::array<std::string_view, 3> arguments;
+};
+
+/// A declaration that portable_glsl.h spells as a macro; without one its macro is empty.
+Declaration parse_declaration(std::string_view line) {
+  constexpr std::array<std::string_view, 8> macros{"DEFINE_INT",     "UNIFORM",         "UNIFORM_ARRAY", "VALUE_TEXTURE",
+                                                   "VALUE_TEXTURES", "INTEGER_TEXTURE", "BUFFER",        "VALUE_TEXTURE_SET"};
+  line = trimmed(line);
+  const std::size_t open = line.find('(');
+  const std::size_t close = line.rfind(')');
+  if (open == std::string_view::npos || close == std::string_view::npos) return {};
+  if (std::find(macros.begin(), macros.end(), line.substr(0, open)) == macros.end()) return {};
+  Declaration d{line.substr(0, open), {}};
+  std::string_view rest = line.substr(open + 1, close - open - 1);
+  for (std::string_view& argument : d.arguments) {
+    const std::size_t comma = std::min(rest.find(','), rest.size());
+    argument = trimmed(rest.substr(0, comma));
+    rest.remove_prefix(std::min(comma + 1, rest.size()));
+  }
+  return d;
+}
+
+/// What stands behind `//`.
+std::string_view comment_of(std::string_view line) {
+  const std::size_t at = line.find("//");
+  return at == std::string_view::npos ? std::string_view() : trimmed(line.substr(at + 2));
+}
+
 /// The line with its comments blanked; `inside` says whether a block comment is open.
 std::string without_comments(std::string_view line, bool& inside) {
   std::string code;
@@ -58,6 +91,42 @@ std::string without_comments(std::string_view line, bool& inside) {
   return code;
 }
 
+/// Which lines of a file the #ifs around them leave in.
+class Branches {
+ public:
+  bool active() const { return stack_.empty() || stack_.back().active; }
+  bool balanced() const { return stack_.empty(); }
+  /// Is the condition of an #elif asked for?
+  bool undecided() const { return !stack_.empty() && stack_.back().outer && !stack_.back().taken; }
+
+  void open(bool condition) {
+    const bool outer = active();
+    stack_.push_back({outer, condition, outer && condition});
+  }
+  /// #elif and #else. False without an #if.
+  bool turn(bool condition) {
+    if (stack_.empty()) return false;
+    Branch& b = stack_.back();
+    b.active = b.outer && !b.taken && condition;
+    b.taken = b.taken || condition;
+    return true;
+  }
+  /// False without an #if.
+  bool close() {
+    if (stack_.empty()) return false;
+    stack_.pop_back();
+    return true;
+  }
+
+ private:
+  struct Branch {
+    bool outer;  // is what is around it left in?
+    bool taken;  // was any branch of it?
+    bool active;
+  };
+  std::vector<Branch> stack_;
+};
+
 class Assembler {
  public:
   Assembler(const ShaderKey& key, FindFile find) : key_(key), find_(std::move(find)) {}
@@ -71,10 +140,9 @@ class Assembler {
   }
 
  private:
-  struct Place {  ///< where an include stands, or stood first
+  struct Place {
     std::string file;
     int line = 0;
-    bool conditional = false;
   };
 
   void add_line(std::string_view line) { result_.text.append(line).push_back('\n'); }
@@ -82,7 +150,10 @@ class Assembler {
   void add_prelude() {
     add_line("#version 450 core");
     for (const std::string& name : key_.extensions) add_line(fmt::format("#extension {} : require", name));
-    for (const auto& [name, text] : key_.defines) add_line(fmt::format("#define {} {}", name, text));
+    for (const auto& [name, text] : key_.defines) {
+      add_line(fmt::format("#define {} {}", name, text));
+      macros_.define(name, text);
+    }
   }
 
   std::string chain_text() const {
@@ -104,30 +175,88 @@ class Assembler {
   }
 
   void add_lines(const std::string& path, std::string_view text, std::size_t index) {
-    int depth = 0;
+    Branches branches;
     bool in_comment = false;
-    int number = 0;
+    std::string code;  // of a line and those that a backslash joins to it
+    chain_.push_back({path, 0});
     while (!text.empty()) {
       const std::size_t end = std::min(text.find('\n'), text.size());
       const std::string_view line = text.substr(0, end);
       text.remove_prefix(std::min(end + 1, text.size()));
-      ++number;
-      const std::string code = without_comments(line, in_comment);
+      ++chain_.back().line;
+      code += without_comments(line, in_comment);
+      if (code.ends_with('\\')) {
+        code.back() = ' ';
+        add_line(line);
+        continue;
+      }
       const Directive directive = parse_directive(code);
-      if (directive.name.starts_with("if")) ++depth;
-      if (directive.name == "endif") --depth;
       if (directive.name == "include") {
-        chain_.push_back({path, number, depth > 0});
-        add_include(directive.rest);
-        chain_.pop_back();
-        add_line(fmt::format("#line {} {}", number + 1, index));
+        if (branches.active()) add_include(directive.rest);
+        add_line(fmt::format("#line {} {}", chain_.back().line + 1, index));
       } else if (directive.name == "pragma" && directive.rest == "once") {
         add_line("");  // true of every file here; drivers would warn
       } else {
         add_line(line);
+        if (!directive.name.empty())
+          obey(directive, branches);
+        else if (branches.active())
+          note_declaration(parse_declaration(code), comment_of(line));
       }
+      code.clear();
     }
-    if (depth != 0) throw Error(fmt::format("{}: #if without #endif", path));
+    if (!branches.balanced()) throw Error(fmt::format("{}: #if without #endif", path));
+    chain_.pop_back();
+  }
+
+  std::int64_t evaluate(std::string_view what, std::string_view expression) const {
+    try {
+      return macros_.evaluate(expression);
+    } catch (const Error& problem) {
+      fail(fmt::format("{} {}: {}", what, expression, problem.what()));
+    }
+  }
+
+  /// The directives that decide which lines are left in, and the names that they ask for.
+  void obey(const Directive& d, Branches& branches) {
+    const bool active = branches.active();
+    if (d.name == "if")
+      branches.open(active && evaluate("#if", d.rest) != 0);
+    else if (d.name == "ifdef")
+      branches.open(macros_.defined(d.rest));
+    else if (d.name == "ifndef")
+      branches.open(!macros_.defined(d.rest));
+    else if (d.name == "elif" && !branches.turn(branches.undecided() && evaluate("#elif", d.rest) != 0))
+      fail("#elif without #if");
+    else if (d.name == "else" && !branches.turn(true))
+      fail("#else without #if");
+    else if (d.name == "endif" && !branches.close())
+      fail("#endif without #if");
+    else if (active && d.name == "define")
+      macros_.define(d.rest);
+    else if (active && d.name == "undef")
+      macros_.undefine(d.rest);
+    else if (active && d.name == "error")
+      fail(d.rest);
+  }
+
+  /// Notes what the host has to provide; a define has to be there already.
+  void note_declaration(const Declaration& d, std::string_view meaning) {
+    if (d.macro.empty()) return;
+    const std::string place = fmt::format("{}:{}", chain_.back().file, chain_.back().line);
+    const std::string first(d.arguments[0]);
+    const std::string second(d.arguments[1]);
+    if (d.macro == "DEFINE_INT") {
+      if (!macros_.defined(first)) fail(fmt::format("{} is not defined{}{}", first, meaning.empty() ? "" : ": ", meaning));
+    } else if (d.macro == "UNIFORM" || d.macro == "UNIFORM_ARRAY") {
+      const bool array = d.macro == "UNIFORM_ARRAY";
+      result_.uniforms.push_back({second, place, array ? static_cast<int>(evaluate(second, d.arguments[2])) : 1});
+    } else if (d.macro == "VALUE_TEXTURES") {
+      const auto count = static_cast<int>(evaluate(first, d.arguments[1]));
+      for (int i = 0; i < count; ++i) result_.resources.push_back({element_name(first, i), place, 1});
+    } else {
+      result_.resources.push_back({d.macro == "BUFFER" ? second : first, place, 1});
+    }
   }
 
   void add_include(std::string_view what) {
@@ -143,22 +272,15 @@ class Assembler {
   void include(const std::string& path, std::string_view wanted_as) {
     const auto open = [&](const Place& place) { return place.file == path; };
     if (std::any_of(chain_.begin(), chain_.end(), open)) fail(fmt::format("'{}' includes itself", path));
-    const bool conditional = std::any_of(chain_.begin(), chain_.end(), [](const Place& place) { return place.conditional; });
-    const auto [first, added] = included_.emplace(path, chain_.back());
-    if (added) {
-      first->second.conditional = conditional;
-      add_file(path, wanted_as);
-    } else if (first->second.conditional) {
-      fail(fmt::format("'{}' was taken at {}:{} already, inside an #if that may have left it out", path, first->second.file,
-                       first->second.line));
-    }
+    if (included_.insert(path).second) add_file(path, wanted_as);
   }
 
   const ShaderKey& key_;
   FindFile find_;
   AssembledShader result_;
+  ShaderMacros macros_;
   std::vector<Place> chain_;
-  std::map<std::string, Place> included_;
+  std::set<std::string> included_;
 };
 
 /// Takes the decimal number that `text` begins with.

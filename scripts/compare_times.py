@@ -1,0 +1,114 @@
+#!/usr/bin/env python3
+"""Compares the frame times of two programs on the scene of experiments/limits, in alternating pairs of runs.
+
+usage: scripts/compare_times.py PROGRAM OTHER [--levels 4] [--frames 5] [--least 20] [--most 100] [--half-width 0.02] [--out FILE]
+
+Prints one row a point: the ratio of the medians of OTHER to PROGRAM (the geometric mean over pairs) and its 95 % interval. Pairs are
+run until the interval of every point is narrow enough, and one program beside itself shows what the machine does.
+"""
+
+import argparse
+import json
+import math
+import statistics
+import sys
+
+import experiment_runs
+
+ENCODINGS = [
+    {"name": "uniform", "filters": "linear_page"},
+    {"name": "page_table", "page_size": 16, "filters": "linear_page"},
+    {"name": "octree", "filters": ["nearest", "linear_lod"], "filtering": "manual"},
+    {"name": "kd_tree", "filters": "linear_lod"},
+    {"name": "exabricks", "filters": "basis"},
+]
+RENDER = [{"sampling": "lattice", "skip": False}, {"sampling": "adaptive", "skip": True}]
+
+# 97.5 % points of Student's t; between two rows the smaller number of pairs counts
+STUDENT_T = {1: 12.71, 2: 4.303, 3: 3.182, 4: 2.776, 5: 2.571, 6: 2.447, 7: 2.365, 8: 2.306, 9: 2.262, 10: 2.228, 12: 2.179,
+             15: 2.131, 19: 2.093, 25: 2.060, 30: 2.042, 40: 2.021, 60: 2.000, 100: 1.984}
+
+
+def student_t(freedom):
+    return STUDENT_T[max(f for f in STUDENT_T if f <= freedom)]
+
+
+def interval(ratios):
+    """Geometric mean of the ratios and the ends of its 95 % interval."""
+    logs = [math.log(r) for r in ratios]
+    mean = statistics.fmean(logs)
+    if len(logs) < 2:
+        return math.exp(mean), 0.0, math.inf
+    half = student_t(len(logs) - 1) * statistics.stdev(logs) / math.sqrt(len(logs))
+    return math.exp(mean), math.exp(mean - half), math.exp(mean + half)
+
+
+def half_width(ratios):
+    _, low, high = interval(ratios)
+    return (high - low) / 2
+
+
+def timing_experiment(levels, frames):
+    experiment = experiment_runs.read_experiment("experiments/limits/experiment.json")
+    render = {k: v for k, v in experiment["render"].items() if k not in ("sampling", "skip")}
+    experiment.update(name="compare_times", encodings=ENCODINGS, frames=frames, warm_up=1, baseline=False, reference=None,
+                      datasets=[{"name": "blobs_shell", "generate": {"field": "blobs_shell", "levels": levels}}],
+                      render=[{**render, **r} for r in RENDER])
+    return experiment
+
+
+def medians(program, experiment):
+    """Median frame time in milliseconds of each point, by its title."""
+    records = experiment_runs.run(program, experiment)
+    failed = [r for r in records if r["status"] != "ok"]
+    if failed:
+        raise SystemExit(f"{program}: {experiment_runs.title(failed[0])}: {failed[0]['status']}: {failed[0]['reason']}")
+    return {experiment_runs.title(r): r["frame"]["wall_ms"]["median"] for r in records}
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("program")
+    parser.add_argument("other")
+    parser.add_argument("--levels", type=int, default=4, help="of the mesh; 4 is the 512^3 of the experiment")
+    parser.add_argument("--frames", type=int, default=5, help="timed frames of each point and run")
+    parser.add_argument("--least", type=int, default=20, help="pairs at least")
+    parser.add_argument("--most", type=int, default=100, help="pairs at most")
+    parser.add_argument("--half-width", type=float, default=0.02, help="of the ratio's interval, at which a point is done")
+    parser.add_argument("--out", help="JSON file for all medians and ratios")
+    return parser.parse_args()
+
+
+def main():
+    a = arguments()
+    experiment = timing_experiment(a.levels, a.frames)
+    pairs = []
+    ratios = {}
+    while len(pairs) < a.most:
+        # who begins changes from pair to pair, so that a machine that grows faster or slower favours neither
+        order = [a.program, a.other] if len(pairs) % 2 == 0 else [a.other, a.program]
+        times = [medians(program, experiment) for program in order]
+        mine, theirs = times if len(pairs) % 2 == 0 else times[::-1]
+        pairs.append({"program": mine, "other": theirs})
+        for point, time in mine.items():
+            ratios.setdefault(point, []).append(theirs[point] / time)
+        widest = max((half_width(r) for r in ratios.values()), default=math.inf)
+        print(f"pair {len(pairs)}: widest half-width {widest:.4f}", file=sys.stderr)
+        if len(pairs) >= a.least and widest < a.half_width:
+            break
+    print(f"{a.other} / {a.program}, {len(pairs)} pairs, {a.frames} frames a run\n")
+    print("| point | ms | ratio | 95 % interval |\n|---|---:|---:|---|")
+    rows = []
+    for point, values in ratios.items():
+        ratio, low, high = interval(values)
+        time = statistics.median(p["program"][point] for p in pairs)
+        rows.append({"point": point, "milliseconds": time, "ratio": ratio, "interval": [low, high]})
+        print(f"| {point} | {time:.1f} | {ratio:.3f} | {low:.3f} to {high:.3f} |")
+    if a.out:
+        with open(a.out, "w", encoding="utf-8") as file:
+            json.dump({"pairs": pairs, "rows": rows}, file, indent=1)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
