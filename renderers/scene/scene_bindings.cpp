@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "renderers/consumers/triangle_layer.hpp"
+#include "renderers/scene/scene_settings.hpp"
 #include "structures/common/build_tools.hpp"
 
 namespace amrtex {
@@ -198,7 +199,6 @@ double surface_depth(double opacity) { return opacity < 1 ? -std::log1p(-opacity
 
 void add_surfaces(const Scene& scene, const EncodedField& field, SceneBindings& b) {
   const Isosurfaces& iso = scene.settings.isosurfaces;
-  validate(iso);
   std::vector<double> light;
   for (std::size_t i = 0; i < iso.values.size(); ++i) {
     const Vec3d rgb = surface_color(scene, iso.values[i]);
@@ -229,7 +229,6 @@ void add_surfaces(const Scene& scene, const EncodedField& field, SceneBindings& 
 constexpr double kFarLamp = 1e7;
 
 void add_light(const AmrHierarchy& h, const RenderSettings& s, SceneBindings& b) {
-  validate_light(s);
   b.defines.emplace_back("AMRTEX_SHADOWS", s.point_light ? 1 : 0);
   if (!s.point_light) return;
   const Vec3d middle = (h.domain_lower() + h.domain_upper()) * 0.5;
@@ -243,7 +242,6 @@ void add_light(const AmrHierarchy& h, const RenderSettings& s, SceneBindings& b)
 }
 
 void add_clip_planes(const AmrHierarchy& h, const RenderSettings& s, SceneBindings& b) {
-  validate_clip_planes(s.clip_planes);
   b.defines.emplace_back("AMRTEX_CLIP_PLANES", static_cast<int>(s.clip_planes.size()));
   constexpr double kFar = 1e30;  // a plane beyond it keeps all or nothing, and is a float
   std::vector<double> planes;
@@ -255,7 +253,6 @@ void add_clip_planes(const AmrHierarchy& h, const RenderSettings& s, SceneBindin
 }
 
 void add_ray_offset(const RenderSettings& s, SceneBindings& b) {
-  validate_ray_offset(s);
   b.defines.emplace_back("AMRTEX_RAY_OFFSET", s.ray_offset ? 1 : 0);
   if (s.ray_offset) b.uniforms.push_back({"u_ray_seed", std::vector<int>{static_cast<int>(*s.ray_offset)}});
 }
@@ -273,7 +270,6 @@ void add_occlusion(const AmrHierarchy& h, const RenderSettings& s, SceneBindings
 
 /// Nothing of it in a scene without triangles, not even a define: they have an entry point of their own.
 void add_triangles(const AmrHierarchy& h, const Scene& scene, SceneBindings& b) {
-  validate_triangles(scene.settings);
   const std::vector<TriangleObject>& objects = scene.settings.triangles;
   if (objects.empty()) return;
   const auto start = std::chrono::steady_clock::now();
@@ -348,7 +344,6 @@ constexpr double kToleranceLeft = 0.1;
 
 void add_integrator(const Scene& scene, const EncodedField& field, double unit, SceneBindings& b) {
   const RenderSettings& s = scene.settings;
-  validate_integrator(s);
   b.defines.emplace_back("AMRTEX_INTEGRATOR", static_cast<int>(s.integrator));
   const bool by_tolerance = s.integrator == Integrator::tolerance;
   if (by_tolerance || s.integrator == Integrator::preintegrated)
@@ -364,7 +359,6 @@ void add_integrator(const Scene& scene, const EncodedField& field, double unit, 
 
 /// The fields beside the first: nothing of theirs where there are none.
 void add_fields(const AmrHierarchy& h, const EncodedField& field, const Scene& scene, SceneBindings& b) {
-  validate_fields(scene);
   const std::vector<FieldTransfer>& more = scene.more_fields;
   const auto count = static_cast<int>(more.size());
   b.defines.emplace_back("AMRTEX_TRANSFERS", 1 + count);
@@ -396,8 +390,7 @@ void require_hidden_parts(const EncodedField& field, const Scene& scene) {
   if (field.invisible.empty()) return;
   Scene pruned = scene;
   pruned.settings.prune = true;
-  validate_prune(pruned.settings);
-  validate_fields(pruned);
+  for (const char* key : {"prune", "transfer_functions"}) validate_setting(pruned, key);
   const std::vector<double> hidden = invisible_ranges(scene.transfer_function);
   for (const auto& [from, to] : field.invisible) {
     bool still = false;
@@ -457,6 +450,7 @@ UniformValues field_uniforms(const AmrHierarchy& h, const EncodedField& field) {
 
 SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const Scene& scene) {
   const RenderSettings& s = scene.settings;
+  validate(scene);
   check_sampling(h, scene);
   const double unit = smallest_edge(h);
   SceneBindings b;
@@ -503,7 +497,6 @@ SceneBindings bind_scene(const AmrHierarchy& h, const EncodedField& field, const
                {"AMRTEX_ISOVALUES", s.draws_surfaces() ? static_cast<int>(s.isosurfaces.values.size()) : 0}};
   add_clip_planes(h, s, b);
   add_ray_offset(s, b);
-  validate_mirror(s);
   add_occlusion(h, s, b);
   b.defines.emplace_back("AMRTEX_MIRROR", s.mirror ? 2 * s.mirror->axis + (s.mirror->upper ? 2 : 1) : 0);
   add_light(h, s, b);
@@ -528,9 +521,8 @@ SceneNeeds scene_needs(const Scene& scene, Filter filter, Filtering filtering) {
       shading == Shading::gradient || (scene.settings.draws_surfaces() && scene.settings.isosurfaces.ambient_occlusion);
   needs.analytic_gradients = shading == Shading::analytic;
   needs.gradients = lit || needs.everything;
-  validate_fields(scene);
+  for (const char* key : {"transfer_functions", "prune"}) validate_setting(scene, key);
   if (!scene.settings.prune) return needs;
-  validate_prune(scene.settings);
   const std::vector<double> ranges = invisible_ranges(scene.transfer_function);
   for (std::size_t i = 0; i < ranges.size(); i += 2) needs.invisible.push_back({ranges[i], ranges[i + 1]});
   return needs;
