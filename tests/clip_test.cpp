@@ -353,12 +353,13 @@ TEST(Clip, IsRefusedByThePlanesNumber) {
     EXPECT_EQ(by_shader, by_reference);
     return by_shader;
   };
-  EXPECT_THAT(complaint({kOblique, {{0, 0, 0}, 1}}), AllOf(HasSubstr("'clip_planes' plane 1"), HasSubstr("no direction")));
+  EXPECT_THAT(complaint({kOblique, {{0, 0, 0}, 1}}), AllOf(HasSubstr("'clip_planes': plane 1"), HasSubstr("no direction")));
   for (const double bad : {kNan, kInf}) {
-    EXPECT_THAT(complaint({{{1, bad, 0}, 1}}), AllOf(HasSubstr("plane 0"), HasSubstr("finite")));
-    EXPECT_THAT(complaint({kOblique, kOblique, {{1, 0, 0}, bad}}), AllOf(HasSubstr("plane 2"), HasSubstr("finite")));
+    EXPECT_THAT(complaint({{{1, bad, 0}, 1}}), AllOf(HasSubstr("'clip_planes'[0]"), HasSubstr("a number is expected")));
+    EXPECT_THAT(complaint({kOblique, kOblique, {{1, 0, 0}, bad}}),
+                AllOf(HasSubstr("'clip_planes'[2]"), HasSubstr("a number is expected")));
   }
-  EXPECT_THAT(complaint(std::vector<ClipPlane>(9, kOblique)), AllOf(HasSubstr("9 planes"), HasSubstr("at most 8")));
+  EXPECT_THAT(complaint(std::vector<ClipPlane>(9, kOblique)), AllOf(HasSubstr("9 values"), HasSubstr("at most 8")));
 }
 
 }  // namespace

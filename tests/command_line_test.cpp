@@ -148,7 +148,7 @@ Json one_point() { return with(small_experiment(), "encodings", {{{"name", "page
 
 TEST_F(CommandLine, EveryCommandHasHelpWithAnExample) {
   for (const std::string command : {"encodings", "doctor", "info", "generate", "convert", "sample", "structure", "render", "run",
-                                    "report", "verify", "advise"}) {
+                                    "report", "verify", "advise", "settings"}) {
     const Result r = amrtex({command, "--help"});
     EXPECT_EQ(r.exit_code, 0) << command;
     EXPECT_THAT(r.out, HasSubstr("Example: amrtex " + command));
@@ -567,6 +567,30 @@ TEST_F(CommandLine, RenderReachesTheErrorThatItIsAskedFor) {
   EXPECT_EQ(amrtex({"render", scene, "-o", at("a.npy"), "--tolerance", "1e-3"}).exit_code, 0);
   EXPECT_EQ(amrtex({"render", scene, "-o", at("r.npy"), "--reference"}).exit_code, 0);
   EXPECT_GE(share_within(pixel_errors(read_npy(at("a.npy")), read_npy(at("r.npy"))), 1e-3), 0.95);
+}
+
+TEST_F(CommandLine, SetReplacesWhatTheFileSays) {
+  const std::string scene = experiment_file(one_point());
+  EXPECT_EQ(amrtex({"render", scene, "-o", at("a.npy"), "--set", "width=7", "--set", "render.height=5"}).exit_code, 0);
+  EXPECT_EQ(read_npy(at("a.npy")).width, 7);
+  EXPECT_EQ(read_npy(at("a.npy")).height, 5);
+  EXPECT_EQ(amrtex({"render", "--set", "width=6", scene, "-o", at("a.npy")}).exit_code, 0) << "one value an option";
+  expect_complaint(amrtex({"render", scene, "-o", at("b.npy"), "--set", "render.step=0"}), 2,
+                   HasSubstr("--set render.step=0: render.step: a number above 0"));
+  expect_complaint(amrtex({"run", scene, "--out", at("out"), "--set", "stpe=1"}), 2, HasSubstr("did you mean 'step'?"));
+  expect_complaint(amrtex({"run", scene, "--out", at("out"), "--set", "step=[1,2,3]", "--max-points", "2"}), 2, HasSubstr("3 points"));
+  EXPECT_FALSE(fs::exists(at("out"))) << "before any work";
+}
+
+TEST_F(CommandLine, SettingsListsTheKeysOfFilesAndWritesTheirTables) {
+  const Result text = amrtex({"settings"});
+  EXPECT_THAT(text.out, AllOf(HasSubstr("\nrender\n"), HasSubstr("\n  step ")));
+  EXPECT_TRUE(Json::parse(amrtex({"settings", "--json"}).out).is_array());
+  EXPECT_THAT(amrtex({"settings", "--markdown", "render"}).out, HasSubstr("| `step` |"));
+  expect_complaint(amrtex({"settings", "--markdown", "rendr"}), 2, HasSubstr("render"));
+  write_text(at("doc.md"), "<!-- settings:reference -->\n<!-- /settings:reference -->\n");
+  EXPECT_EQ(amrtex({"settings", "--write", at("doc.md")}).exit_code, 0);
+  EXPECT_THAT(read_text(at("doc.md")), HasSubstr("| `own` |"));
 }
 
 TEST_F(CommandLine, RenderRefusesWhatIsNoSceneOrNoPicture) {

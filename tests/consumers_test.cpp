@@ -441,21 +441,21 @@ TEST(BoxConsumers, RefuseByNameWhatTheyCannotDraw) {
   scene.settings.consumer = ConsumerKind::multipass;
   scene.settings.mode = Mode::iso;
   scene.settings.isosurfaces.values = {0.5};
-  EXPECT_NE(refusal(scene).find("consumer multipass: mode iso"), std::string::npos) << refusal(scene);
+  EXPECT_NE(refusal(scene).find("not iso"), std::string::npos) << refusal(scene);
   scene = plain;
   scene.settings.integrator = Integrator::preintegrated;
-  EXPECT_NE(refusal(scene).find("consumer slices: integrator preintegrated"), std::string::npos) << refusal(scene);
+  EXPECT_NE(refusal(scene).find("not preintegrated"), std::string::npos) << refusal(scene);
   scene.settings.integrator = Integrator::exponential_midpoint;
   scene.settings.point_light.emplace();
-  EXPECT_NE(refusal(scene).find("consumer slices: point_light"), std::string::npos) << refusal(scene);
+  EXPECT_NE(refusal(scene).find("consumer slices: 'point_light'"), std::string::npos) << refusal(scene);
   scene.settings.point_light.reset();
   scene.settings.early_end = 0.95;
-  EXPECT_NE(refusal(scene).find("consumer slices: early_end"), std::string::npos) << refusal(scene);
+  EXPECT_NE(refusal(scene).find("consumer slices: 'early_end'"), std::string::npos) << refusal(scene);
   scene = plain;
   scene.settings.consumer = ConsumerKind::stencil_slices;
   scene.settings.mode = Mode::mip;
   scene.settings.slice_target = SliceTarget::rgba8;
-  EXPECT_NE(refusal(scene).find("consumer stencil_slices: slice_target rgba8"), std::string::npos) << refusal(scene);
+  EXPECT_NE(refusal(scene).find("consumer stencil_slices: 'slice_target'"), std::string::npos) << refusal(scene);
   scene.settings.slice_target = SliceTarget::rgba32f;
   EXPECT_EQ(refusal(scene), "drawn");
 }

@@ -321,11 +321,11 @@ TEST(Fields, AreRefusedByNameWhereTheyCannotBeDrawn) {
     return complaint_of(scene, field);
   };
   EXPECT_THAT(refused([](Scene& s) { s.settings.integrator = Integrator::preintegrated; }),
-              AllOf(HasSubstr("2 fields"), HasSubstr("preintegrated"), HasSubstr("euler")));
+              AllOf(HasSubstr("not preintegrated"), HasSubstr("euler")));
   EXPECT_THAT(refused([](Scene& s) { s.settings.integrator = Integrator::tolerance; }), HasSubstr("tolerance"));
   EXPECT_THAT(refused([](Scene& s) { s.settings.prune = true; }), AllOf(HasSubstr("'prune'"), HasSubstr("one of both")));
   EXPECT_THAT(refused([](Scene& s) { s.settings.point_light = PointLight{}; }), HasSubstr("'point_light'"));
-  EXPECT_THAT(refused([](Scene& s) { s.settings.mode = Mode::mip; }), AllOf(HasSubstr("mode mip"), HasSubstr("dvr")));
+  EXPECT_THAT(refused([](Scene& s) { s.settings.mode = Mode::mip; }), HasSubstr("the mode dvr, not mip"));
   EXPECT_THAT(refused([](Scene& s) {
                 for (int i = 0; i < 20; ++i) s.more_fields[0].transfer_function.extinction.push_back({2.0 + i, 1});
               }),
@@ -373,7 +373,7 @@ TEST(Prune, IsForOneTransferFunctionAlone) {
     EXPECT_THAT(complaint_of(other, field), AllOf(HasSubstr("pruned for a transfer function"), HasSubstr("without --prune")));
     other = scene;
     other.settings.mode = Mode::mip;
-    EXPECT_THAT(complaint_of(other, field), HasSubstr("mode mip"));
+    EXPECT_THAT(complaint_of(other, field), HasSubstr("the mode dvr, not mip"));
   });
   EXPECT_GT(pruned, 2);
 }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "renderers/bindings/scene_bindings.hpp"
+#include "renderers/scene/scene_settings.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {
@@ -193,10 +194,10 @@ TEST(Occlusion, IsLeftOutOfScenesWithoutIt) {
 
 TEST(Occlusion, IsRefusedByNameWithWhatIsAccepted) {
   const auto complaint = [](const std::function<void(Isosurfaces&)>& spoil) {
-    Isosurfaces iso = wave_scene(Mode::iso, 0.3).settings.isosurfaces;
-    spoil(iso);
+    Scene scene = wave_scene(Mode::iso, 0.3);
+    spoil(scene.settings.isosurfaces);
     try {
-      validate(iso);
+      validate(scene);
     } catch (const UsageError& e) {
       return std::string(e.what());
     }
@@ -211,7 +212,7 @@ TEST(Occlusion, IsRefusedByNameWithWhatIsAccepted) {
               AllOf(HasSubstr("output color"), HasSubstr("normal")));
   Scene mirrored = wave_scene(Mode::iso, 0.3);
   mirrored.settings.mirror = Mirror{0, true};
-  EXPECT_THROW(validate_mirror(mirrored.settings), UsageError);
+  EXPECT_THROW(validate_setting(mirrored, "mirror"), UsageError);
 }
 
 }  // namespace

@@ -170,7 +170,7 @@ TEST(SceneJson, ViewsErrorsNameTheKey) {
   refused(R"({"eye":[1,2,3],"at":[0,0,0],"zoom":3})", {"zoom", "eye", "at", "up", "fov_y", "projection", "height"});
   refused(R"({"at":[0,0,0]})", {"eye"});
   refused(R"({"eye":[1,2],"at":[0,0,0]})", {"eye", "three numbers"});
-  refused(R"({"eye":[1,2,"3"],"at":[0,0,0]})", {"eye", "three numbers"});
+  refused(R"({"eye":[1,2,"3"],"at":[0,0,0]})", {"eye", "a number is expected"});
   refused(R"({"eye":[1,2,3],"at":[0,0,0],"projection":"fisheye"})", {"projection", "fisheye", "perspective", "orthographic"});
   refused(R"({"eye":[1,2,3],"at":[0,0,0],"projection":"orthographic"})", {"height"});
   refused(R"({"eye":[1,2,3],"at":[0,0,0],"height":1})", {"height", "orthographic"});

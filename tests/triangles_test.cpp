@@ -647,7 +647,7 @@ TEST(Triangles, AreRefusedByName) {
   EXPECT_THAT(complaint(scene), AllOf(HasSubstr("17"), HasSubstr("at most 16")));
   scene.settings.triangles.resize(2);
   scene.settings.triangles[1].color = {0, kNan, 0};
-  EXPECT_THAT(complaint(scene), AllOf(HasSubstr("object 1"), HasSubstr("[0, 1]")));
+  EXPECT_THAT(complaint(scene), AllOf(HasSubstr("'triangles'[1].color"), HasSubstr("from 0 to 1")));
   EXPECT_THROW(TriangleMesh({}), Error);
   EXPECT_THROW(TriangleMesh({{Vec3d(0), Vec3d(kInf), Vec3d(1)}}), Error);
 }

@@ -8,6 +8,7 @@
 #include "renderers/consumers/make_consumer.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
 #include "structures/mesh/quoted.hpp"
+#include "renderers/scene/scene_settings.hpp"
 
 namespace amrtex {
 namespace {
@@ -16,6 +17,7 @@ namespace fs = std::filesystem;
 
 struct Arguments {
   std::string scene, output, context, memory_limit;
+  std::vector<std::string> set;
   bool reference = false;
   bool color_bar = false;
   bool explain_error = false;
@@ -40,16 +42,16 @@ void write_picture(const Arguments& a, const Picture& picture, const Experiment&
 }
 
 /// An error asked for replaces the scene's step.
-RenderPoint with_tolerance(RenderPoint point, const std::optional<double>& tolerance) {
-  if (!tolerance) return point;
-  point.settings.integrator = Integrator::tolerance;
-  point.settings.tolerance = *tolerance;
+Scene with_tolerance(Scene scene, const std::optional<double>& tolerance) {
+  if (!tolerance) return scene;
+  scene.settings.integrator = Integrator::tolerance;
+  scene.settings.tolerance = *tolerance;
   try {
-    validate_integrator(point.settings);
+    for (const char* key : {"tolerance", "integrator"}) validate_setting(scene, key);
   } catch (const UsageError& e) {
     throw UsageError(fmt::format("--tolerance: {}", e.what()));
   }
-  return point;
+  return scene;
 }
 
 double reference_step(const Arguments& a, const Experiment& scene) {
@@ -104,10 +106,10 @@ int run(const Arguments& a) {
   const std::string extension = fs::path(a.output).extension();
   if (!a.output.empty() && extension != ".png" && extension != ".npy")
     throw UsageError(fmt::format("-o {}: accepted: a name ending in .png (to look at) or .npy (floats to measure)", a.output));
-  const Experiment scene = read_scene(a.scene);
+  const Experiment scene = read_scene(a.scene, {.set = a.set});
   const BuildPoint& build = scene.builds.front();
   const AmrHierarchy mesh = load_dataset(scene, scene.datasets[build.dataset]);
-  Scene drawn = scene_of(scene, with_tolerance(scene.renders.front(), a.tolerance));
+  Scene drawn = with_tolerance(scene_of(scene, scene.renders.front()), a.tolerance);
   drawn.settings.prune = drawn.settings.prune || a.prune;
   const auto context = make_context(parse_context_kind(a.context.empty() ? scene.context : a.context));
   BuildRequest request;
@@ -151,6 +153,7 @@ void add_render_command(CLI::App& app, Command& chosen) {
   c->add_option("-o,--out", a->output, "picture: .png to look at, .npy for the floats; may be left out with --explain-error");
   c->add_option("--context", a->context, "egl, egl_device or osmesa; overrides the scene's");
   c->add_option("--memory-limit", a->memory_limit, "for the structure, as 512MiB");
+  add_set_option(*c, a->set);
   c->add_flag("--reference", a->reference, "draw the double-precision reference of the filter instead");
   c->add_option("--reference-step", a->reference_step, "its step, in widths of the finest cells");
   c->add_option("--tolerance", a->tolerance,

@@ -19,6 +19,8 @@ namespace fs = std::filesystem;
 
 struct Arguments {
   std::string input, output, context, memory_limit, columns;
+  std::vector<std::string> set;
+  std::uint64_t max_points = ReadOptions{}.most_points;
   bool force = false;
   bool json = false;
 };
@@ -81,7 +83,7 @@ void copy_beside(const Experiment& experiment, const fs::path& folder, const cha
 }
 
 int run(const Arguments& a) {
-  const Experiment experiment = read_experiment(a.input);
+  const Experiment experiment = read_experiment(a.input, {.set = a.set, .most_points = a.max_points});
   const fs::path paper_tables = experiment.file.parent_path() / "tables.json";
   if (fs::exists(paper_tables)) {  // an error ends here, before any work
     make_paper_tables(paper_tables, {});
@@ -140,6 +142,15 @@ std::int64_t parse_bytes(const std::string& text) {
   return static_cast<std::int64_t>(number * factor);
 }
 
+void add_set_option(CLI::App& command, std::vector<std::string>& set) {
+  command
+      .add_option(
+          "--set", set,
+          "key=value, as render.step=0.5 or step=0.5: replaces what the file says; JSON, or else text; `amrtex settings` lists "
+          "the keys")
+      ->allow_extra_args(false);
+}
+
 void add_run_commands(CLI::App& app, Command& chosen) {
   auto a = std::make_shared<Arguments>();
   CLI::App* r = app.add_subcommand("run", "measure all points of an experiment; goes on where an earlier run stopped");
@@ -147,6 +158,8 @@ void add_run_commands(CLI::App& app, Command& chosen) {
   r->add_option("--out", a->output, "folder for records, pictures and tables")->required();
   r->add_option("--context", a->context, "egl, egl_device or osmesa; overrides the experiment's");
   r->add_option("--memory-limit", a->memory_limit, "for one structure, as 512MiB");
+  add_set_option(*r, a->set);
+  r->add_option("--max-points", a->max_points, "points of one file, above which it is refused")->capture_default_str();
   r->add_flag("--force", a->force, "measure again what has a record");
   r->add_flag("--json", a->json, "print counts for programs");
   r->footer("Example: amrtex run experiments/quickstart/experiment.json --out out/quickstart");

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "structures/common/encoding.hpp"
 
@@ -22,6 +23,9 @@ void add_render_command(CLI::App& app, Command& chosen);
 void add_run_commands(CLI::App& app, Command& chosen);  // run, report
 void add_verify_command(CLI::App& app, Command& chosen);
 void add_advise_command(CLI::App& app, Command& chosen);
+void add_settings_command(CLI::App& app, Command& chosen);
+/// `--set key=value`, any number of times (bench/settings/override.hpp).
+void add_set_option(CLI::App& command, std::vector<std::string>& set);
 
 /// "512MiB", "2GiB", "1000000". Throws UsageError.
 std::int64_t parse_bytes(const std::string& text);

@@ -62,6 +62,7 @@ int main(int argc, char** argv) {
   amrtex::add_run_commands(app, chosen);
   amrtex::add_verify_command(app, chosen);
   amrtex::add_advise_command(app, chosen);
+  amrtex::add_settings_command(app, chosen);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

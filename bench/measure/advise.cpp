@@ -254,7 +254,7 @@ class Search {
     std::vector<Candidate> all;
     for (const BuildPoint& build : builds)
       for (const RenderSettings& settings : candidate_settings(request_)) {
-        if (!interpolates(build.filter) && settings.integrator == Integrator::tolerance) continue;  // validate_integrator
+        if (!interpolates(build.filter) && settings.integrator == Integrator::tolerance) continue;
         all.push_back({build, settings});
       }
     return all;

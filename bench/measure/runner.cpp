@@ -18,6 +18,7 @@
 #include "renderers/consumers/make_consumer.hpp"
 #include "renderers/gpu/structure.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
+#include "renderers/scene/scene_settings.hpp"
 #include "structures/generators/synthetic.hpp"
 #include "structures/readers/mesh_io.hpp"
 
@@ -482,38 +483,13 @@ std::vector<std::string> scene_warnings(const AmrHierarchy& hierarchy, const Sce
 
 Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definition, const Scene& scene, double step,
                          const fs::path& folder, std::string& hash) {
-  // no sampling settings: the reference is independent of them
-  Json key;
-  key["mesh"] = hierarchy.content_hash(0);
+  Json key = {{"scene", scene_reference(scene)}, {"mesh", hierarchy.content_hash(0)}};
   const Vec3d lower = hierarchy.domain_lower();
   const Vec3d upper = hierarchy.domain_upper();
   key["domain"] = {lower.x, lower.y, lower.z, upper.x, upper.y, upper.z};
   key["filter"] = filter_name(definition.filter);
   key["page"] = {definition.page_size, definition.page_level};
-  key["mode"] = mode_name(scene.settings.mode);
-  key["size"] = {scene.settings.width, scene.settings.height};
-  key["view"] = to_json(scene.view);
-  if (scene.settings.draws_surfaces()) {
-    key["isosurfaces"] = surfaces_json(scene.settings.isosurfaces);
-    if (const auto& around = scene.settings.isosurfaces.ambient_occlusion)
-      key["isosurfaces"]["ambient_occlusion"] = {{"radius", around->radius}};  // the rest is sampling
-    for (const int field : more_fields(hierarchy, scene)) key["color_field"] = hierarchy.content_hash(field);
-  }
-  if (scene.settings.draws_volume() || scene.settings.draws_surfaces())
-    key["transfer_function"] = to_json(scene.transfer_function);
-  if (!scene.more_fields.empty()) {
-    key["more_transfer_functions"] = to_json(scene.more_fields);
-    for (const int field : more_fields(hierarchy, scene)) key["more_fields"].push_back(hierarchy.content_hash(field));
-  }
-  if (scene.settings.point_light) {
-    key["light"] = light_json(*scene.settings.point_light);
-    key["light"].erase("shadow_step");  // sampling
-  }
-  if (scene.settings.mirror) key["mirror"] = mirror_name(*scene.settings.mirror);
-  if (!scene.settings.clip_planes.empty()) key["clip_planes"] = clip_planes_json(scene.settings.clip_planes);
-  if (!scene.settings.triangles.empty()) key["triangles"] = triangles_json(scene.settings.triangles);
-  if (scene.region)
-    for (const Vec3d& corner : *scene.region) key["region"].push_back({corner.x, corner.y, corner.z});
+  for (const int field : more_fields(hierarchy, scene)) key["more_fields"].push_back(hierarchy.content_hash(field));
   key["step"] = step;
   key["method"] = 1;
   hash = configuration_hash(key);

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "bench/records/record.hpp"
+#include "structures/mesh/suggestion.hpp"
 
 namespace amrtex {
 namespace {

@@ -5,12 +5,15 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <optional>
 #include <set>
 
 #include "bench/records/record.hpp"
 #include "bench/settings/json_file.hpp"
+#include "bench/settings/settings_table.hpp"
 #include "structures/mesh/error.hpp"
+#include "structures/mesh/suggestion.hpp"
 
 namespace amrtex {
 namespace {
@@ -43,12 +46,23 @@ struct Group {
 enum class Role { setting, measure };
 
 struct ColumnRule {
+  std::string key;
+  std::string label;
+  std::string latex;  ///< "" = the label
+  Role role;
+  bool numeric;
+  std::function<Cell(const Json& record, const Group& group)> cell;
+};
+
+/// A rule that no key of a file gives.
+struct FixedColumn {
   const char* key;
   const char* label;
-  const char* latex;  ///< "" = the label
+  const char* latex;
   Role role;
   bool numeric;
   Cell (*cell)(const Json& record, const Group& group);
+  operator ColumnRule() const { return {key, label, latex, role, numeric, cell}; }
 };
 
 template <std::size_t N>
@@ -112,11 +126,6 @@ Cell status_cell(const Json& record, const Group&) {
   return reason.empty() ? status : fmt::format("{}: {}", status, reason);
 }
 
-/// Said only where it is on.
-Cell ray_offset_cell(const Json& record, const Group&) {
-  return at(record, "/render/ray_offset") == true ? Cell("on") : Cell(std::monostate());
-}
-
 /// What was left out for want of need, and because it is hidden.
 Cell left_out_cell(const Json& record, const Group&) {
   const Json& list = at(record, "/left_out");
@@ -166,35 +175,21 @@ Cell relative_cell(const Json& record, const Group& group) {
   return time.get<double>() / baseline_ms;
 }
 
-constexpr ColumnRule kColumns[] = {
+/// Settings that are no key of a file, or several of them.
+constexpr FixedColumn kFirstSettings[] = {
     {"dataset", "dataset", "", Role::setting, false, value<"/dataset/name">},
     {"field", "field", "", Role::setting, false, value<"/dataset/field">},
     {"leaf_cells", "leaf cells", "", Role::setting, true, value<"/dataset/leaf_cells">},
     {"encoding", "encoding", "", Role::setting, false, encoding_cell},
-    {"filter", "filter", "", Role::setting, false, value<"/filter">},
-    {"filtering", "filtering", "", Role::setting, false, value<"/filtering">},
-    {"storage", "storage", "", Role::setting, false, value<"/storage">},
-    {"consumer", "consumer", "", Role::setting, false, value<"/render/consumer">},
-    {"slice_target", "slice target", "", Role::setting, false, value<"/render/slice_target">},
-    {"mode", "mode", "", Role::setting, false, value<"/render/mode">},
-    {"sampling", "sampling", "", Role::setting, false, value<"/render/sampling">},
-    {"step", "step (cells)", "", Role::setting, true, value<"/render/step">},
-    {"tolerance", "tolerance", "", Role::setting, true, value<"/render/tolerance">},
-    {"integrator", "integrator", "", Role::setting, false, value<"/render/integrator">},
+};
+constexpr FixedColumn kLastSettings[] = {
     {"picture", "picture (pixels)", "", Role::setting, false, picture_cell},
-    {"skip", "skip", "", Role::setting, false, value<"/render/skip">},
-    {"level_of_detail", "level of detail", "pixels", Role::setting, true, value<"/render/level_of_detail">},
-    {"max_level", "max level", "", Role::setting, true, value<"/render/max_level">},
-    {"shading", "shading", "", Role::setting, false, value<"/render/shading">},
-    {"output", "output", "", Role::setting, false, value<"/render/output">},
-    {"ray_offset", "offset of rays", "", Role::setting, false, ray_offset_cell},
-    {"point_light", "lamp", "", Role::setting, false, value<"/render/point_light">},
-    {"needs", "needs", "", Role::setting, false, value<"/render/needs">},
-    {"prune", "prune", "", Role::setting, false, value<"/render/prune">},
-    {"early_end", "early end (opacity)", "", Role::setting, true, value<"/render/early_end">},
     {"view", "view", "", Role::setting, false, named<"/render/view_name", "/render/view">},
     {"transfer_function", "transfer function", "", Role::setting, false,
      named<"/render/transfer_function_name", "/render/transfer_function">},
+};
+
+constexpr FixedColumn kMeasures[] = {
     {"total", "total (MiB)", "", Role::measure, true, mebibytes<"/memory/total_bytes">},
     {"payload", "payload (MiB)", "", Role::measure, true, mebibytes<"/memory/by_role/payload">},
     {"duplicated", "duplicated (MiB)", "", Role::measure, true, mebibytes<"/memory/by_role/duplicated">},
@@ -240,6 +235,34 @@ constexpr ColumnRule kColumns[] = {
     {"status", "status", "", Role::measure, false, status_cell},
 };
 
+/// Columns of the keys of a table that have one; their values stand below `pointer` of a record.
+template <class T>
+void add_columns(std::vector<ColumnRule>& columns, const SettingTable<T>& settings, const std::string& pointer) {
+  for (const Setting<T>& row : settings.rows()) {
+    const Key& key = row.key;
+    if (key.column.label.empty()) continue;
+    const auto cell = [place = pointer + key.in_record(), &key](const Json& record, const Group&) -> Cell {
+      const Json& own = value_at(record, place);
+      return key.column.only_where_given && own == key.default_value ? Cell() : cell_of(own);
+    };
+    columns.push_back({key.in_record(), key.column.label, "", Role::setting, key.column.numeric, cell});
+  }
+}
+
+std::vector<ColumnRule> make_columns() {
+  std::vector<ColumnRule> columns(std::begin(kFirstSettings), std::end(kFirstSettings));
+  add_columns(columns, build_settings(), "/");
+  add_columns(columns, scene_settings(), "/render/");
+  columns.insert(columns.end(), std::begin(kLastSettings), std::end(kLastSettings));
+  columns.insert(columns.end(), std::begin(kMeasures), std::end(kMeasures));
+  return columns;
+}
+
+const std::vector<ColumnRule>& all_columns() {
+  static const std::vector<ColumnRule> columns = make_columns();
+  return columns;
+}
+
 /// The error by cause has a table of its own.
 bool is_split(const ColumnRule& rule) { return std::string_view(rule.key).starts_with("split_"); }
 
@@ -253,7 +276,7 @@ bool is_default(const ColumnRule& rule) {
 }
 
 const ColumnRule& find_rule(std::string_view key) {
-  for (const ColumnRule& rule : kColumns)
+  for (const ColumnRule& rule : all_columns())
     if (key == rule.key) return rule;
   const auto keys = column_keys();
   throw UsageError(fmt::format("no column '{}'; accepted: {}{}", key, fmt::join(keys, ", "), suggestion(key, keys)));
@@ -347,7 +370,7 @@ void add_constant_parameters(Table& table, const Group& group) {
 
 void add_default_columns(Table& table, const Group& group) {
   std::vector<std::string> absent;
-  for (const ColumnRule& rule : kColumns) {
+  for (const ColumnRule& rule : all_columns()) {
     const std::vector<Cell> cells = column_cells(rule, group);
     if (rule.role == Role::setting && all_equal(cells) && std::string_view(rule.key) != "encoding") {
       if (!all_absent(cells)) table.constants.emplace_back(rule.label, format_cell(cells.front()));
@@ -362,7 +385,7 @@ void add_default_columns(Table& table, const Group& group) {
 
 void add_chosen_columns(Table& table, const Group& group, const std::vector<std::string>& keys) {
   for (const std::string& key : keys) add_column(table, find_rule(key), column_cells(find_rule(key), group));
-  for (const ColumnRule& rule : kColumns) {
+  for (const ColumnRule& rule : all_columns()) {
     if (rule.role != Role::setting || std::find(keys.begin(), keys.end(), rule.key) != keys.end()) continue;
     const std::vector<Cell> cells = column_cells(rule, group);
     if (all_equal(cells) && !all_absent(cells)) table.constants.emplace_back(rule.label, format_cell(cells.front()));
@@ -407,7 +430,7 @@ std::optional<Table> make_split_table(const std::string& experiment, const std::
   table.constants.emplace_back("renderer", renderer);
   const Group group{in_order(explained), varying_parameters(explained, true)};
   table.rows.resize(explained.size());
-  for (const ColumnRule& rule : kColumns) {
+  for (const ColumnRule& rule : all_columns()) {
     const std::vector<Cell> cells = column_cells(rule, group);
     const bool varies = rule.role == Role::setting && !all_equal(cells);
     if (varies || std::string_view(rule.key) == "encoding" || (is_split(rule) && !all_absent(cells)))
@@ -422,7 +445,7 @@ std::optional<Table> make_split_table(const std::string& experiment, const std::
 
 std::vector<std::string_view> column_keys() {
   std::vector<std::string_view> keys;
-  for (const ColumnRule& rule : kColumns) keys.emplace_back(rule.key);
+  for (const ColumnRule& rule : all_columns()) keys.emplace_back(rule.key);
   return keys;
 }
 
@@ -451,7 +474,7 @@ Table make_setting_table(std::string title, std::span<const Json* const> rows, s
     for (const Json* record : rows) cells.push_back(record != nullptr ? rule.cell(*record, group) : Cell());
     add_column(table, rule, cells);
   };
-  for (const ColumnRule& rule : kColumns) {
+  for (const ColumnRule& rule : all_columns()) {
     if (rule.role != Role::setting) continue;
     const std::vector<Cell> cells = column_cells(rule, group);
     if (!all_equal(cells) || std::string_view(rule.key) == "encoding")

@@ -82,34 +82,30 @@ struct Experiment {
   std::size_t points() const { return builds.size() * renders.size(); }
 };
 
+/// How a file is read.
+struct ReadOptions {
+  std::vector<std::string> set = {};      ///< "render.step=0.5": values that replace those of the file (docs/experiments.md)
+  std::uint64_t most_points = 1'000'000;  ///< a file with more is refused before any of them is made
+};
+
 /// Throw UsageErrors that name file, line and key and what is accepted there, and Error
 /// when the file cannot be read. Relative data paths are looked for in the folder of the
 /// file, then in the current one.
-Experiment read_experiment(const std::filesystem::path& path);
-Experiment parse_experiment(std::string text, const std::filesystem::path& path);
+Experiment read_experiment(const std::filesystem::path& path, const ReadOptions& options = {});
+Experiment parse_experiment(std::string text, const std::filesystem::path& path, const ReadOptions& options = {});
 
 /// An experiment of one point; a UsageError names the axes that a scene cannot have.
-Experiment read_scene(const std::filesystem::path& path);
-Experiment parse_scene(std::string text, const std::filesystem::path& path);
+Experiment read_scene(const std::filesystem::path& path, const ReadOptions& options = {});
+Experiment parse_scene(std::string text, const std::filesystem::path& path, const ReadOptions& options = {});
 
 /// The scene of one render point.
 Scene scene_of(const Experiment& experiment, const RenderPoint& render);
 
-/// What a record and the name of a reference hold of isosurfaces.
-Json surfaces_json(const Isosurfaces& isosurfaces);
-
-/// What a record holds of a lamp.
-Json light_json(const PointLight& light);
-/// Planes [a, b, c, d], as in experiment files.
-Json clip_planes_json(const std::vector<ClipPlane>& planes);
-/// [{"hash", "triangles", "color"}]: objects by what they hold, whatever their files are called.
-Json triangles_json(const std::vector<TriangleObject>& objects);
-
 /// The `render` part of a record, names of view and transfer function included.
 Json render_json(const RenderPoint& render);
 
-/// Everything that decides what a point measures, for `configuration_hash`.
-/// `dataset_hash` is that of the mesh as loaded.
+/// Everything that decides what a point measures, for `configuration_hash`; keys at their default are left out, so that a key
+/// that is added later renames no record. `dataset_hash` is that of the mesh as loaded.
 Json point_configuration(const Experiment& experiment, const BuildPoint& build, const RenderPoint& render,
                          std::string_view dataset_hash);
 

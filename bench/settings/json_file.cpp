@@ -11,6 +11,7 @@
 #include "structures/mesh/error.hpp"
 #include "structures/mesh/quoted.hpp"
 #include "structures/readers/reader_tools.hpp"
+#include "structures/mesh/suggestion.hpp"
 
 namespace amrtex {
 namespace {
@@ -172,21 +173,6 @@ class Builder {
   Lines* lines_;
 };
 
-/// Letters to insert, remove, replace or swap with their neighbour (optimal string alignment).
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
-  for (std::size_t i = 0; i <= a.size(); ++i) d[i][0] = i;
-  for (std::size_t j = 0; j <= b.size(); ++j) d[0][j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i)
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t replaced = d[i - 1][j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1);
-      d[i][j] = std::min({replaced, d[i - 1][j] + 1, d[i][j - 1] + 1});
-      const bool swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
-      if (swapped) d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
-    }
-  return d[a.size()][b.size()];
-}
-
 Json parse(std::string_view text, const std::filesystem::path& path, Lines* lines) {
   // the parser takes a NUL for the end and never sees what follows
   if (const std::size_t nul = text.find('\0'); nul != std::string_view::npos)
@@ -198,20 +184,6 @@ Json parse(std::string_view text, const std::filesystem::path& path, Lines* line
 }
 
 }  // namespace
-
-std::string suggestion(std::string_view name, std::span<const std::string_view> accepted) {
-  if (name.size() > kLongestName) return "";
-  std::string_view best;
-  std::size_t best_distance = 1 + std::max<std::size_t>(1, name.size() / 3);
-  for (const std::string_view candidate : accepted) {
-    const std::size_t distance = edit_distance(name, candidate);
-    if (distance < best_distance) {
-      best = candidate;
-      best_distance = distance;
-    }
-  }
-  return best.empty() ? "" : fmt::format("; did you mean '{}'?", best);
-}
 
 Json read_json(const std::filesystem::path& path) { return parse(load_stream(path, kMostBytes), path, nullptr); }
 
@@ -231,9 +203,44 @@ int JsonFile::line(std::string_view place) const {
   }
 }
 
+std::string JsonFile::position(std::string_view place) const {
+  for (std::string_view around = place;;) {
+    if (const auto origin = origins_.find(around); origin != origins_.end()) return origin->second + ": ";
+    const std::size_t cut = around.find_last_of(".[");
+    if (cut == std::string_view::npos) break;
+    around = around.substr(0, cut);
+  }
+  return fmt::format("{}:{}: ", path_.string(), line(place));
+}
+
+void JsonFile::set(const std::string& place, Json value, const std::string& origin) {
+  Json* json = &json_;
+  for (std::size_t at = 0; at < place.size();) {
+    const bool element = place[at] == '[';
+    const std::size_t begin = at + (element || place[at] == '.' ? 1 : 0);
+    at = std::min(place.find_first_of(element ? "]" : ".[", begin), place.size());
+    const std::string step = place.substr(begin, at - begin);
+    if (element) {
+      ++at;
+      const auto index = step.empty() || step.find_first_not_of("0123456789") != std::string::npos || step.size() > 9
+                             ? json->size()
+                             : static_cast<std::size_t>(std::stoul(step));
+      if (!json->is_array() || index >= json->size())
+        throw UsageError(fmt::format("{}: no element [{}]; the list has {}", origin, step, json->is_array() ? json->size() : 0));
+      json = &(*json)[index];
+    } else {
+      if (!json->is_object() && !json->is_null())
+        throw UsageError(fmt::format("{}: '{}' has no place in {}", origin, step, shown(*json)));
+      json = &(*json)[step];
+    }
+  }
+  *json = std::move(value);
+  origins_.insert_or_assign(place, origin);
+}
+
 void JsonNode::fail(std::string_view problem) const {
-  throw UsageError(fmt::format("{}:{}: {}{}{}", file_->path().string(), file_->line(place_), clipped(place_),
-                               place_.empty() ? "" : ": ", one_line(problem, kLongestProblem)));
+  throw UsageError(fmt::format("{}{}{}{}", file_->position(place_), clipped(place_), place_.empty() ? "" : ": ",
+                               one_line(problem, kLongestProblem)));
 }
 
 std::optional<JsonNode> JsonNode::find(std::string_view key) const {

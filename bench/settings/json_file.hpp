@@ -26,6 +26,11 @@ class JsonFile {
   JsonFile(const std::string& text, std::filesystem::path path);
 
   const std::filesystem::path& path() const { return path_; }
+  /// Replaces or adds a value at a place such as "encodings[1].page_size". Complaints about it name `origin` in place of file and
+  /// line. Throws UsageError where something on the way is neither an object nor a list that has the element.
+  void set(const std::string& place, Json value, const std::string& origin);
+  /// "file:line: ", or the origin of a value that was set.
+  std::string position(std::string_view place) const;
   JsonNode root() const;
   /// Line (from 1) of a place such as "encodings[1].page_size"; of the nearest place around it where it has none.
   int line(std::string_view place) const;
@@ -34,6 +39,7 @@ class JsonFile {
   std::filesystem::path path_;
   Json json_;
   std::map<std::string, int, std::less<>> lines_;
+  std::map<std::string, std::string, std::less<>> origins_;  ///< of values that were set, by place
 };
 
 /// A value of a JsonFile and where it stands. The file must outlive it.
@@ -45,6 +51,9 @@ class JsonNode {
   const std::string& place() const { return place_; }
   /// Throws a UsageError "file:line: place: problem".
   [[noreturn]] void fail(std::string_view problem) const;
+
+  /// A place in this value, for complaints: "[0]", ".radius"; itself for "".
+  JsonNode below(std::string_view place) const { return {*file_, *json_, place_ + std::string(place)}; }
 
   std::optional<JsonNode> find(std::string_view key) const;
   JsonNode require(std::string_view key) const;  ///< throws UsageError when the key is missing
@@ -71,8 +80,5 @@ class JsonNode {
 
 /// The value of a JSON file that no person writes, whose lines nobody asks for. Throws as JsonFile::read does.
 Json read_json(const std::filesystem::path& path);
-
-/// "; did you mean 'x'?", or nothing when no accepted name is near.
-std::string suggestion(std::string_view name, std::span<const std::string_view> accepted);
 
 }  // namespace amrtex

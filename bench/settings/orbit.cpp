@@ -1,74 +1,84 @@
 #include "bench/settings/orbit.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 
-#include "structures/mesh/error.hpp"
+#include "structures/mesh/spaces.hpp"
 
 namespace amrtex {
 namespace {
 
-constexpr std::array<std::string_view, 5> kKeys = {"at", "radius", "count", "axis", "elevation"};
 constexpr int kMostViews = 10000;
 
 struct Orbit {
   Vec3d at{0};
-  double radius = 0;             ///< world
-  int count = 0;                 ///< views
-  Vec3d axis{0, 0, 1};           ///< unit length
-  double elevation[2] = {0, 0};  ///< of the first and the last view over the plane across the axis, degrees
+  double radius = 0;                         ///< world
+  int count = 0;                             ///< views
+  Vec3d axis{0, 0, 1};                       ///< of any length but 0
+  std::array<double, 2> elevation = {0, 0};  ///< of the first and the last view over the plane across the axis, degrees
 };
 
-/// The place of the key stands in quotes, by which the parser of the file finds its line.
-[[noreturn]] void refuse(std::string_view key, const Json& value, std::string_view accepted) {
-  throw UsageError(fmt::format("'orbit': {} {}; accepted: {}", key, value.is_null() ? "is missing" : value.dump(), accepted));
+Json list_of_numbers(const Vec3d& v) { return Json::array({v.x, v.y, v.z}); }
+Vec3d vector(const Json& v) { return {v[0].get<double>(), v[1].get<double>(), v[2].get<double>()}; }
+
+SettingTable<Orbit> make_settings() {
+  const ValueType three = list_of(number_type(), 3, "three numbers [x, y, z]");
+  ValueType elevation = list_of(number_above(-90, 90), 0, "an angle between -90 and 90, or two of them [first, last]");
+  elevation.below = true;
+  elevation.most = 2;
+  std::vector<Setting<Orbit>> rows;
+  rows.push_back(
+      {{.name = "at", .type = three, .reference = AffectsReference::yes, .help = "the middle", .unit = "world", .required = true},
+       [](const Orbit& o) { return list_of_numbers(o.at); },
+       [](Orbit& o, const Json& v) { o.at = vector(v); }});
+  rows.push_back({{.name = "radius",
+                   .type = number_above(0),
+                   .reference = AffectsReference::yes,
+                   .help = "distance of all eyes from `at`",
+                   .unit = "world length",
+                   .required = true},
+                  [](const Orbit& o) -> Json { return o.radius; },
+                  [](Orbit& o, const Json& v) { o.radius = v.get<double>(); }});
+  rows.push_back({{.name = "count",
+                   .type = integer_type(1, kMostViews),
+                   .reference = AffectsReference::yes,
+                   .help = "views, at equal angles around `axis`",
+                   .required = true},
+                  [](const Orbit& o) -> Json { return o.count; },
+                  [](Orbit& o, const Json& v) { o.count = v.get<int>(); }});
+  rows.push_back(
+      {{.name = "axis", .type = three, .reference = AffectsReference::yes, .help = "not all 0; also `up` of each view"},
+       [](const Orbit& o) { return list_of_numbers(o.axis); },
+       [](Orbit& o, const Json& v) { o.axis = vector(v); },
+       [](const Orbit& o) -> std::string {
+         return glm::length(o.axis) > 0 ? "" : "accepted: three numbers [x, y, z], not all 0";
+       }});
+  rows.push_back({{.name = "elevation",
+                   .type = elevation,
+                   .reference = AffectsReference::yes,
+                   .help = "angle over the plane across the axis, of all views, or of the first and the last",
+                   .unit = "degrees"},
+                  [](const Orbit& o) -> Json { return o.elevation; },
+                  [](Orbit& o, const Json& v) {
+                    const Json& first = v.is_array() ? v.front() : v;
+                    const Json& last = v.is_array() ? v.back() : v;
+                    o.elevation = {first.get<double>(), last.get<double>()};
+                  }});
+  return {"orbit", std::move(rows)};
 }
 
-Json value_of(const Json& orbit, const char* key) { return orbit.contains(key) ? orbit.at(key) : Json(); }
-
-Vec3d vector_of(const Json& value, std::string_view key, std::string_view accepted) {
-  const bool three = value.is_array() && value.size() == 3;
-  if (!three || !std::all_of(value.begin(), value.end(), [](const Json& v) { return v.is_number(); }))
-    refuse(key, value, accepted);
-  return {value[0].get<double>(), value[1].get<double>(), value[2].get<double>()};
-}
-
-void read_elevation(const Json& value, Orbit& orbit) {
-  const auto right = [](const Json& v) { return v.is_number() && std::abs(v.get<double>()) < 90; };
-  if (right(value)) {
-    orbit.elevation[0] = orbit.elevation[1] = value.get<double>();
-    return;
-  }
-  if (!value.is_array() || value.size() != 2 || !right(value[0]) || !right(value[1]))
-    refuse("elevation", value, "degrees between -90 and 90, or two of them [first, last]");
-  for (std::size_t i = 0; i < 2; ++i) orbit.elevation[i] = value[i].get<double>();
+const SettingTable<Orbit>& settings() {
+  static const SettingTable<Orbit> settings = make_settings();
+  return settings;
 }
 
 Orbit read_orbit(const Json& json) {
-  if (!json.is_object())
-    throw UsageError(fmt::format("'orbit': {}; accepted: an object with {}", json.dump(), fmt::join(kKeys, ", ")));
-  for (const auto& [key, value] : json.items())
-    if (std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end())
-      throw UsageError(fmt::format("'orbit': no key {}; accepted: {}", key, fmt::join(kKeys, ", ")));
-  Orbit orbit;
-  orbit.at = vector_of(value_of(json, "at"), "at", "three numbers [x, y, z]");
-  const Json radius = value_of(json, "radius"), count = value_of(json, "count");
-  if (!radius.is_number() || !(radius.get<double>() > 0)) refuse("radius", radius, "a world length above 0");
-  orbit.radius = radius.get<double>();
-  if (!count.is_number_integer() || count < 1 || count > kMostViews)
-    refuse("count", count, fmt::format("an integer from 1 to {}", kMostViews));
-  orbit.count = count.get<int>();
-  if (json.contains("axis")) {
-    orbit.axis = vector_of(json.at("axis"), "axis", "three numbers [x, y, z], not all 0");
-    if (!(glm::length(orbit.axis) > 0)) refuse("axis", json.at("axis"), "three numbers [x, y, z], not all 0");
-    orbit.axis = glm::normalize(orbit.axis);
-  }
-  if (json.contains("elevation")) read_elevation(json.at("elevation"), orbit);
+  Orbit orbit = settings().parse(json, "'orbit'");
+  orbit.axis = glm::normalize(orbit.axis);
   return orbit;
 }
 
@@ -92,9 +102,9 @@ Vec3d eye_of(const Orbit& orbit, int i) {
   return orbit.at + orbit.radius * (std::cos(elevation) * across + std::sin(elevation) * orbit.axis);
 }
 
-Json list_of(const Vec3d& v) { return {v.x, v.y, v.z}; }
-
 }  // namespace
+
+std::vector<const Key*> orbit_keys() { return settings().keys(); }
 
 std::vector<std::pair<Json, std::string>> orbit_views(const Json& view, const std::string& name) {
   if (!view.contains("orbit")) return {{view, name}};
@@ -106,9 +116,9 @@ std::vector<std::pair<Json, std::string>> orbit_views(const Json& view, const st
   for (int i = 0; i < orbit.count; ++i) {
     Json one = view;
     one.erase("orbit");
-    one["eye"] = list_of(eye_of(orbit, i));
-    one["at"] = list_of(orbit.at);
-    one["up"] = list_of(orbit.axis);
+    one["eye"] = list_of_numbers(eye_of(orbit, i));
+    one["at"] = list_of_numbers(orbit.at);
+    one["up"] = list_of_numbers(orbit.axis);
     views.emplace_back(std::move(one), fmt::format("{}_{:0{}}", name, i, digits));
   }
   return views;

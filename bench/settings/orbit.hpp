@@ -5,9 +5,11 @@
 #include <utility>
 #include <vector>
 
-#include "structures/common/encoding.hpp"
+#include "renderers/scene/setting.hpp"
 
 namespace amrtex {
+
+std::vector<const Key*> orbit_keys();
 
 /// The views that one view of an experiment stands for, each as parse_view reads it and with its name: without the key `orbit`
 /// that view itself; with it `count` views called `name`_00, `name`_01, ... on a sphere around `at`, at equal angles around

@@ -64,7 +64,6 @@ HostTexture triangle_buffer(const TriangleLayer& layer, double unit) {
 void add_surfaces(const Scene& scene, int fields, SceneBindings& b) {
   if (!scene.settings.draws_surfaces()) return;
   const Isosurfaces& iso = scene.settings.isosurfaces;
-  validate(iso);
   std::vector<double> light;
   for (std::size_t i = 0; i < iso.values.size(); ++i) {
     const Vec3d rgb = surface_color(scene, iso.values[i]);
@@ -92,7 +91,6 @@ void add_occlusion(const DomainGeometry& geometry, const RenderSettings& s, Scen
 }
 
 void add_light(const DomainGeometry& geometry, const RenderSettings& s, SceneBindings& b) {
-  validate_light(s);
   b.define("AMRTEX_SHADOWS", s.point_light ? 1 : 0);
   if (!s.point_light) return;
   const double far = kFarLamp * glm::length(geometry.size());
@@ -105,7 +103,6 @@ void add_light(const DomainGeometry& geometry, const RenderSettings& s, SceneBin
 }
 
 void add_clip_planes(const DomainGeometry& geometry, const RenderSettings& s, SceneBindings& b) {
-  validate_clip_planes(s.clip_planes);
   b.define("AMRTEX_CLIP_PLANES", static_cast<int>(s.clip_planes.size()));
   std::vector<double> planes;
   for (const ClipPlane& plane : s.clip_planes) {
@@ -117,18 +114,15 @@ void add_clip_planes(const DomainGeometry& geometry, const RenderSettings& s, Sc
 }
 
 void add_ray_offset(const RenderSettings& s, SceneBindings& b) {
-  validate_ray_offset(s);
   b.define("AMRTEX_RAY_OFFSET", s.ray_offset ? 1 : 0);
   if (s.ray_offset) b.set("u_ray_seed", static_cast<int>(*s.ray_offset));
 }
 
 void add_mirror(const RenderSettings& s, SceneBindings& b) {
-  validate_mirror(s);
   b.define("AMRTEX_MIRROR", s.mirror ? 2 * s.mirror->axis + (s.mirror->upper ? 2 : 1) : 0);
 }
 
 void add_triangles(const DomainGeometry& geometry, const Scene& scene, SceneBindings& b) {
-  validate_triangles(scene.settings);
   const std::vector<TriangleObject>& objects = scene.settings.triangles;
   if (objects.empty()) return;
   const auto start = std::chrono::steady_clock::now();

@@ -10,6 +10,7 @@
 #include "renderers/bindings/light_bindings.hpp"
 #include "renderers/bindings/scene_needs.hpp"
 #include "renderers/bindings/transfer_bindings.hpp"
+#include "renderers/scene/scene_settings.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {
@@ -77,7 +78,6 @@ void add_march(const DomainGeometry& geometry, const Scene& scene, SceneBindings
 
 void add_integrator(const DomainGeometry& geometry, const Scene& scene, const FilterDefinition& definition, SceneBindings& b) {
   const RenderSettings& s = scene.settings;
-  validate_integrator(s);
   b.define("AMRTEX_INTEGRATOR", static_cast<int>(s.integrator));
   const bool by_tolerance = s.integrator == Integrator::tolerance;
   if (by_tolerance || s.integrator == Integrator::preintegrated)
@@ -136,6 +136,7 @@ const char* raycast_entry(const Scene& scene) {
 
 SceneBindings bind_scene(const DomainGeometry& geometry, const EncodedField& field, const Scene& scene) {
   const RenderSettings& s = scene.settings;
+  validate(scene);
   check_sampling(geometry, scene);
   require_needs(field, scene);
   SceneBindings b;

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "renderers/bindings/transfer_bindings.hpp"
+#include "renderers/scene/scene_settings.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {
@@ -22,8 +23,7 @@ void require_hidden_parts(const EncodedField& field, const Scene& scene) {
   if (field.invisible.empty()) return;
   Scene pruned = scene;
   pruned.settings.prune = true;
-  validate_prune(pruned.settings);
-  validate_fields(pruned);
+  for (const char* key : {"prune", "transfer_functions"}) validate_setting(pruned, key);
   const auto hidden = invisible_ranges(scene.transfer_function);
   for (const auto& [from, to] : field.invisible) {
     const bool still =
@@ -37,7 +37,6 @@ void require_hidden_parts(const EncodedField& field, const Scene& scene) {
 }
 
 void require_more_fields(const EncodedField& field, const Scene& scene) {
-  validate_fields(scene);
   if (scene.more_fields.empty()) return;
   const auto count = static_cast<int>(1 + scene.more_fields.size());
   if (count > kMostFields)
@@ -64,9 +63,8 @@ SceneNeeds scene_needs(const Scene& scene, Filter filter, Filtering filtering) {
       shading == Shading::gradient || (scene.settings.draws_surfaces() && scene.settings.isosurfaces.ambient_occlusion);
   needs.analytic_gradients = shading == Shading::analytic;
   needs.gradients = lit || needs.everything;
-  validate_fields(scene);
+  for (const char* key : {"transfer_functions", "prune"}) validate_setting(scene, key);
   if (!scene.settings.prune) return needs;
-  validate_prune(scene.settings);
   needs.invisible = invisible_ranges(scene.transfer_function);
   return needs;
 }

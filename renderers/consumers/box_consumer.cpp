@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "renderers/scene/scene_settings.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {
@@ -28,24 +29,8 @@ constexpr float kNoMaximum = -std::numeric_limits<float>::infinity();
 /// The scene again, where these consumers can draw it.
 const Scene& require_drawable(const Scene& scene, const EncodedField& field) {
   const RenderSettings& s = scene.settings;
-  if (s.draws_surfaces())
-    refuse(s, fmt::format("mode {} is not drawn: a surface between two boxes needs both sides; accepted are dvr, projection, mip",
-                          mode_name(s.mode)));
-  if (s.integrator != Integrator::exponential_midpoint)
-    refuse(s, fmt::format("integrator {} carries samples from box to box; accepted is exponential_midpoint",
-                          integrator_name(s.integrator)));
-  if (s.prunes_levels()) refuse(s, "level_of_detail and max_level are not available");
-  if (s.point_light) refuse(s, "point_light is not available: in single passes a secondary ray would leave its box");
-  if (s.ray_offset && s.draws_slices()) refuse(s, "ray_offset is not available: slices lie where they lie for all rays");
-  if (s.mirror) refuse(s, "mirror is not available: boxes of the image are not drawn");
-  if (!scene.more_fields.empty())
-    refuse(s, fmt::format("transfer_functions of {} fields are not available: it draws one", 1 + scene.more_fields.size()));
-  if (!s.triangles.empty())
-    refuse(s, "triangles are not available: boxes are drawn whole, and rays end at triangles inside of them");
-  if (s.early_end) refuse(s, "early_end is not available: a box's shader does not know what was drawn before it");
+  require_consumer(scene);
   if (s.slice_target == SliceTarget::rgba8 && !s.draws_slices()) refuse(s, "slice_target rgba8 belongs to slices");
-  if (s.slice_target == SliceTarget::rgba8 && s.mode != Mode::dvr)
-    refuse(s, fmt::format("slice_target rgba8 holds colours and no values of mode {}; accepted is dvr", mode_name(s.mode)));
   if (field.draw_tree.empty()) refuse(s, fmt::format("encoding {} gives no boxes to draw one by one", field.encoding));
   return scene;
 }

@@ -19,7 +19,7 @@
 #include "renderers/reference/reference_point.hpp"
 #include "renderers/reference/reference_surface.hpp"
 #include "renderers/reference/reference_tracer.hpp"
-#include "renderers/scene/triangle_layer.hpp"
+#include "renderers/scene/scene_settings.hpp"
 
 namespace amrtex {
 namespace {
@@ -259,12 +259,7 @@ void check(const Scene& scene, double step) {
   if (scene.settings.width < 1 || scene.settings.height < 1)
     throw Error(fmt::format("picture of {} x {} pixels: both must be at least 1", scene.settings.width, scene.settings.height));
   if (scene.settings.draws_volume()) validate(scene.transfer_function);
-  if (scene.settings.draws_surfaces()) validate(scene.settings.isosurfaces);
-  validate_light(scene.settings);
-  validate_clip_planes(scene.settings.clip_planes);
-  validate_mirror(scene.settings);
-  validate_fields(scene);
-  validate_triangles(scene.settings);
+  validate(scene);
 }
 
 double extinction_scale(const AmrHierarchy& h, const TransferFunction& tf) {

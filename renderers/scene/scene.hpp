@@ -71,7 +71,11 @@ struct TransferFunction {
   double max_extinction(double min, double max) const;
 };
 
-/// Throws Error (points not ascending, negative or NaN extinction, none at all, log axis with values <= 0).
+/// What is wrong with a curve (points not ascending, negative or NaN extinction, none at all, log axis with values <= 0), and
+/// nothing where it is right.
+std::string extinction_problem(const TransferFunction& transfer_function);
+std::string color_problem(const std::vector<TransferFunction::ColorPoint>& points, bool logarithmic);
+/// Throws Error that names the curve.
 void validate(const TransferFunction& transfer_function);
 
 /// `iso` draws isosurfaces, `dvr_iso` isosurfaces inside the volume.
@@ -107,6 +111,7 @@ Output parse_output(std::string_view name);
 Shading parse_shading(std::string_view name);
 
 inline constexpr std::size_t kMostIsovalues = 16;
+inline constexpr std::size_t kMostSurfaceColors = 16;
 
 /// Light that reaches a surface from around it: the share of `rays` from a hit, cosine-weighted over the hemisphere on the eye's
 /// side, that meet no isosurface within `radius`. A surface's colour is multiplied by it.
@@ -130,9 +135,6 @@ struct Isosurfaces {
   std::optional<AmbientOcclusion> ambient_occlusion;  ///< absent: surfaces take no light from one another; output `color`
 };
 
-/// Throws UsageError (no isovalue, too many, not ascending, opacities that do not fit, ...).
-void validate(const Isosurfaces& isosurfaces);
-
 /// A lamp in a volume (modes `dvr` and `dvr_iso`). What a place sends on is multiplied by
 /// ambient + (1 - ambient) exp(-optical depth of the drawn volume between the place and the lamp).
 struct PointLight {
@@ -154,6 +156,7 @@ ClipPlane in_finest_cells(const DomainGeometry& geometry, const ClipPlane& plane
 struct Mirror {
   int axis = 0;        ///< 0 to 2
   bool upper = false;  ///< the face at the axis's upper end
+  bool operator==(const Mirror&) const = default;
 };
 /// "-x", "+x", "-y", "+y", "-z", "+z"; the second throws a UsageError that names these.
 std::string mirror_name(const Mirror& mirror);
@@ -204,21 +207,6 @@ struct RenderSettings {
   int picture_channels() const;
 };
 
-/// Throws UsageError where what the transfer function hides cannot be left out without a change of the picture.
-void validate_prune(const RenderSettings& settings);
-/// Throws UsageError: a lamp whose numbers are none, or in a picture without a volume. Nothing where there is no lamp.
-void validate_light(const RenderSettings& settings);
-/// Throws UsageError that names the plane: too many, no direction, numbers that are none.
-void validate_clip_planes(const std::vector<ClipPlane>& planes);
-/// Throws UsageError where the integrator's samples are not the middles of intervals that an offset can move.
-void validate_ray_offset(const RenderSettings& settings);
-/// Throws UsageError where a mirror does not go with a lamp or level of detail.
-void validate_mirror(const RenderSettings& settings);
-/// Throws UsageError: too many objects, a colour that is none, or pictures of depth and normals.
-void validate_triangles(const RenderSettings& settings);
-/// Throws UsageError where the integrator does not go with the mode, the sampling or the tolerance.
-void validate_integrator(const RenderSettings& settings);
-
 /// A further field of the volume with its own transfer function.
 struct FieldTransfer {
   std::string field;
@@ -238,8 +226,6 @@ struct Scene {
 /// Points of each curve of a transfer function that shaders evaluate as they are. More make a table, and are refused with several
 /// fields.
 inline constexpr std::size_t kMostExactPoints = 16;
-/// Throws UsageError where several fields do not go with the scene's other settings. Nothing where there is one.
-void validate_fields(const Scene& scene);
 
 /// Colours of surfaces: their own, or the transfer function's, or else one grey.
 TransferFunction surface_colors(const Scene& scene);
