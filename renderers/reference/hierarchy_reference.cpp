@@ -20,6 +20,7 @@
 #include "renderers/reference/reference_surface.hpp"
 #include "renderers/reference/reference_tracer.hpp"
 #include "renderers/scene/scene_settings.hpp"
+#include "renderers/scene/triangle_layer.hpp"
 
 namespace amrtex {
 namespace {
