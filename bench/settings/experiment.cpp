@@ -204,6 +204,7 @@ class Parser {
       DatasetSource source;
       const JsonNode& file = *find(choice, "file");
       source.file = existing_path(file);
+      source.written = file.text();
       if (const JsonNode* field = find(choice, "field"); field != nullptr && !field->json().is_null())
         source.field = field->text();
       const JsonNode* name = find(choice, "name");
@@ -713,12 +714,7 @@ class Parser {
     if (const auto context = root_.find("context")) experiment_.context = context->one_of(kContexts);
     if (const auto limit = root_.find("memory_limit"); limit && !limit->json().is_null())
       experiment_.memory_limit = limit->integer(1, INT64_MAX);
-    if (const auto check = root_.find("check"); check && !check->json().is_null()) {
-      check->accept_keys(Names{"psnr_db"});
-      experiment_.minimum_psnr_db = check->require("psnr_db").number(0, 1000);
-      if (experiment_.reference && !experiment_.reference->own)
-        check->fail("pictures are checked against their own reference; accepted: null where 'reference' has 'own' false");
-    }
+    if (const auto check = root_.find("check"); check && !check->json().is_null()) parse_check(*check);
     if (const auto baseline = root_.find("baseline")) experiment_.baseline = baseline->boolean();
     if (const auto explain = root_.find("explain_error")) {
       experiment_.explain_error = explain->boolean();
@@ -734,6 +730,24 @@ class Parser {
     if (const auto explain = root_.find("explain_left_out")) experiment_.explain_left_out = explain->boolean();
     if (const auto change = root_.find("time_change")) experiment_.time_change = change->boolean();
     if (const auto region = root_.find("region")) parse_region(*region);
+  }
+
+  /// {"psnr_db": number, "why": text}, or {"off": why}.
+  void parse_check(const JsonNode& node) {
+    node.accept_keys(Names{"psnr_db", "why", "off"});
+    const auto bound = node.find("psnr_db"), why = node.find("why"), off = node.find("off");
+    if (bound.has_value() == off.has_value())
+      node.fail("one of the keys 'psnr_db' (a bound of your own) and 'off' (why pictures are not checked) is needed");
+    if (experiment_.reference && !experiment_.reference->own)
+      node.fail("pictures are checked against their own reference; accepted: null where 'reference' has 'own' false");
+    if (off) {
+      if (why) why->fail("belongs to 'psnr_db'; accepted: the reason as the value of 'off'");
+      if (off->text().empty()) off->fail("accepted: the reason why pictures are not checked");
+      experiment_.unchecked_because = off->text();
+      return;
+    }
+    experiment_.minimum_psnr_db = bound->number(0, 1000);
+    if (why) experiment_.check_why = why->text();
   }
 
   /// {"lower": [x, y, z], "upper": [x, y, z]}, or the two corners as a list.
@@ -905,6 +919,7 @@ Json point_configuration(const Experiment& experiment, const BuildPoint& build, 
                         {"context", experiment.context},
                         {"memory_limit", experiment.memory_limit ? Json(*experiment.memory_limit) : Json()},
                         {"minimum_psnr_db", json_or_null(experiment.minimum_psnr_db)}};
+  if (experiment.unchecked_because) configuration["check"] = "off";
   if (experiment.explain_left_out) configuration["explain_left_out"] = true;
   if (experiment.time_change) configuration["time_change"] = true;
   return configuration;
