@@ -117,7 +117,6 @@ TEST(ValidateRecord, NamesThePlaceOfEveryDamage) {
                             {"/frame/gpu_ms", removed},
                             {"/error/rmse", "0"},
                             {"/error/psnr_db", removed},
-                            {"/check", nullptr},
                             {"/check/from", removed},
                             {"/check_reason", "none"},
                             {"/repetition", 0.5},
@@ -141,6 +140,14 @@ TEST(ValidateRecord, WhatIsNotOkHasAReasonAndNoTime) {
   record["reason"] = "the picture differs";
   EXPECT_THAT(complaint(record), HasSubstr("/frame"));
   record["frame"] = nullptr;
+  EXPECT_EQ(complaint(record), "valid");
+}
+
+TEST(ValidateRecord, APictureWithoutACheckSaysWhy) {
+  Json record = good_record();
+  record["check"] = nullptr;
+  EXPECT_THAT(complaint(record), HasSubstr("/check_reason"));
+  record["check_reason"] = "no reference";
   EXPECT_EQ(complaint(record), "valid");
 }
 
