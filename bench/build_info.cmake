@@ -1,6 +1,7 @@
-# Writes OUTPUT: commit and dirty flag of the repository ROOT, and the build type
-# (run as a script at every build, cmake -P). Outside a repository both are empty. The
-# file is touched only when its text changes, so that nothing is compiled in vain.
+# Writes OUTPUT: commit and dirty flag of the repository ROOT, the build type, and a hash
+# over the sources that decide what is drawn (run as a script at every build, cmake -P).
+# Outside a repository commit and flag are empty. The file is touched only when its text
+# changes, so that nothing is compiled in vain.
 set(commit "")
 set(dirty "")
 find_program(git git)
@@ -24,6 +25,25 @@ if(git)
   endif()
 endif()
 
+# Documents, tests and what measures or reports are left out: they change no picture.
+set(patterns bench/measure/check_bound.*)
+foreach(folder shaders structures renderers)
+  foreach(kind cpp hpp h glsl vert frag comp in)
+    list(APPEND patterns ${folder}/*.${kind})
+  endforeach()
+endforeach()
+list(TRANSFORM patterns PREPEND "${ROOT}/")
+file(GLOB_RECURSE sources RELATIVE ${ROOT} ${patterns})
+list(FILTER sources EXCLUDE REGEX "_test\\.cpp$")
+list(SORT sources)
+set(hashes "")
+foreach(source ${sources})
+  file(SHA256 ${ROOT}/${source} hash)
+  string(APPEND hashes "${source} ${hash}\n")
+endforeach()
+string(SHA256 implementation "${hashes}")
+string(SUBSTRING ${implementation} 0 32 implementation)
+
 set(text "// Made by bench/build_info.cmake.
 #pragma once
 
@@ -34,6 +54,7 @@ namespace amrtex {
 inline constexpr std::string_view kBuildType = \"${BUILD_TYPE}\";
 inline constexpr std::string_view kBuildCommit = \"${commit}\";
 inline constexpr std::string_view kBuildDirty = \"${dirty}\";
+inline constexpr std::string_view kImplementation = \"${implementation}\";
 
 }  // namespace amrtex
 ")

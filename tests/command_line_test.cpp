@@ -630,7 +630,8 @@ TEST_F(CommandLine, RunWritesValidRecordsPicturesAndTables) {
     EXPECT_EQ(record.at("error_common").at("filter"), "linear_vertex");
     EXPECT_FALSE(record.at("image_hash").get<std::string>().empty());
   }
-  EXPECT_THAT(names_in(at("out")), ElementsAre("pictures", "records", "references", "table.csv", "table.md", "table.tex"));
+  EXPECT_THAT(names_in(at("out")),
+              ElementsAre("pictures", "records", "references", "shader_cache", "table.csv", "table.md", "table.tex"));
   EXPECT_THAT(names_in(at("out") / "pictures"), SizeIs(3));
   for (const std::string& name : names_in(at("out") / "records")) EXPECT_THAT(name, testing::EndsWith(".json"));
 }
@@ -905,6 +906,30 @@ TEST_F(CommandLine, AWrongPictureFailsAndGetsNoTime) {
   EXPECT_THAT(records()[0].at("reason").get<std::string>(), HasSubstr("psnr_db"));
   EXPECT_TRUE(records()[0].at("frame").is_null());
   EXPECT_FALSE(records()[0].at("error").is_null());
+}
+
+TEST_F(CommandLine, AFolderOfTheFirstSchemaIsNotRunInto) {
+  EXPECT_EQ(counts_of_run(one_point()).at("measured"), 1);
+  Json old = Json::parse(read_text(some_record()));
+  old["schema"] = "amrtex-record/1";
+  write_text(some_record(), old.dump());
+  expect_complaint(run(one_point()), 2,
+                   AllOf(HasSubstr(at("out").string()), HasSubstr("amrtex-record/1"), HasSubstr("another folder")));
+  EXPECT_EQ(amrtex({"report", at("out").string()}).exit_code, 0);
+}
+
+TEST_F(CommandLine, RecordsOfAnotherProgramAreMeasuredAgainUnlessTheyAreToBeKept) {
+  EXPECT_EQ(counts_of_run(one_point()).at("measured"), 1);
+  Json old = Json::parse(read_text(some_record()));
+  if (::getenv("MESA_SHADER_CACHE_DIR") == nullptr) {
+    EXPECT_EQ(old.at("context").at("shader_cache"), "cold");
+  }
+  old["implementation"] = "older";
+  write_text(some_record(), old.dump());
+  EXPECT_EQ(Json::parse(run(one_point(), {"--json", "--keep-old"}).out).at("kept"), 1);
+  EXPECT_EQ(counts_of_run(one_point()).at("measured"), 1);
+  EXPECT_EQ(records().at(0).at("context").at("shader_cache"), "warm");
+  expect_complaint(run(one_point(), {"--force", "--keep-old"}), 2, HasSubstr("--keep-old"));
 }
 
 TEST_F(CommandLine, AnOutputFolderThatCannotBeWrittenLeavesNothing) {

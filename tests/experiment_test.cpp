@@ -289,6 +289,9 @@ TEST(Experiment, KnowsItsLimits) {
   const Experiment e = parsed(json.dump());
   EXPECT_EQ(e.memory_limit, 1000000);
   EXPECT_EQ(e.minimum_psnr_db, 30);
+  EXPECT_FALSE(e.unchecked_because);
+  EXPECT_EQ(parsed(with("check", R"({"psnr_db": 20, "why": "a sketch"})")).check_why, "a sketch");
+  EXPECT_EQ(parsed(with("check", R"({"off": "a control"})")).unchecked_because, "a control");
   EXPECT_EQ(e.context, "osmesa");
   EXPECT_EQ(e.seed, 7u);
   EXPECT_FALSE(e.baseline);
@@ -500,7 +503,10 @@ TEST(ExperimentErrors, NameKeyAndWhatIsAccepted) {
       {"context", "\"glx\"", "context:", "egl, egl_device, osmesa"},
       {"memory_limit", "0", "memory_limit:", "of at least 1"},
       {"baseline", "1", "baseline:", "true or false"},
-      {"check", "{}", "check:", "'psnr_db' is missing"},
+      {"check", "{}", "check:", "one of the keys 'psnr_db'"},
+      {"check", R"({"off": ""})", "check.off:", "the reason why"},
+      {"check", R"({"off": "a control", "psnr_db": 30})", "check:", "one of the keys"},
+      {"check", R"({"off": "a control", "why": "x"})", "check.why:", "belongs to 'psnr_db'"},
       {"check", R"({"psnr": 30})", "check.psnr:", "psnr_db"},
   };
   for (const Mistake& mistake : mistakes)

@@ -46,7 +46,9 @@ Json good_record() {
   const std::vector<double> samples = {3, 1, 2};
   record["frame"] = {{"wall_ms", timing_json(samples)}, {"gpu_ms", nullptr}, {"all_wall_ms", samples}};
   record["error"] = error_json({.rmse = 0, .max = 0, .psnr_db = std::nullopt, .mrse = 0}, "abc");
-  record["error"]["split"] = nullptr;
+  for (const char* key : {"split", "reference_error", "limited_by_reference", "within_tolerance_seen"})
+    record["error"][key] = nullptr;
+  record["check"] = {{"psnr_db", 50.0}, {"from", "default"}, {"why", "the step"}};
   return record;
 }
 
@@ -64,9 +66,10 @@ TEST(BlankRecord, HasEveryFixedKeyInOrder) {
   const Json record = blank_record(Status::unsupported, "no such filter");
   for (const auto& [key, value] : record.items()) keys.push_back(key);
   EXPECT_THAT(
-      keys, testing::ElementsAre("schema", "status", "reason", "experiment", "dataset", "encoding", "build_parameters", "filter",
-                                 "storage", "filtering", "render", "memory", "build_seconds", "upload_seconds", "first_frame_ms",
-                                 "frame", "work", "error", "error_common", "left_out", "image_hash", "context"));
+      keys, testing::ElementsAre("schema", "status", "reason", "experiment", "configuration", "implementation", "repetition",
+                                 "dataset", "encoding", "build_parameters", "filter", "storage", "filtering", "render", "memory",
+                                 "build_seconds", "upload_seconds", "process_peak_bytes", "first_frame_ms", "frame", "work",
+                                 "check", "check_reason", "error", "error_common", "left_out", "image_hash", "context"));
   EXPECT_EQ(complaint(record), "valid");
 }
 
@@ -114,6 +117,10 @@ TEST(ValidateRecord, NamesThePlaceOfEveryDamage) {
                             {"/frame/gpu_ms", removed},
                             {"/error/rmse", "0"},
                             {"/error/psnr_db", removed},
+                            {"/check/from", removed},
+                            {"/check_reason", "none"},
+                            {"/repetition", 0.5},
+                            {"/error/within_tolerance_seen", removed},
                             {"/left_out", Json::object()}};
   for (const Damage& damage : damages) {
     Json record = good_record();
@@ -133,6 +140,14 @@ TEST(ValidateRecord, WhatIsNotOkHasAReasonAndNoTime) {
   record["reason"] = "the picture differs";
   EXPECT_THAT(complaint(record), HasSubstr("/frame"));
   record["frame"] = nullptr;
+  EXPECT_EQ(complaint(record), "valid");
+}
+
+TEST(ValidateRecord, APictureWithoutACheckSaysWhy) {
+  Json record = good_record();
+  record["check"] = nullptr;
+  EXPECT_THAT(complaint(record), HasSubstr("/check_reason"));
+  record["check_reason"] = "no reference";
   EXPECT_EQ(complaint(record), "valid");
 }
 
@@ -280,13 +295,62 @@ TEST_F(RecordFolder, LoadsAllRecordsAndNoLeftovers) {
 
 TEST_F(RecordFolder, NamesTheBrokenFile) {
   write_record(folder_, "good", good_record(), false);
-  std::ofstream(folder_ / "records" / "broken.json") << R"({"schema": "amrtex-record/1", )";
+  std::ofstream(folder_ / "records" / "broken.json") << R"({"schema": "amrtex-record/2", )";
   try {
     load_records(folder_);
     FAIL() << "a broken record was accepted";
   } catch (const Error& e) {
     EXPECT_THAT(e.what(), HasSubstr("broken.json"));
   }
+}
+
+/// As schema 1 had it: without the keys that came later.
+Json first_record() {
+  Json record = good_record();
+  record["schema"] = "amrtex-record/1";
+  for (const char* key : {"configuration", "implementation", "repetition", "process_peak_bytes", "check", "check_reason"})
+    record.erase(key);
+  for (const char* key : {"reference_error", "limited_by_reference", "within_tolerance_seen"}) record["error"].erase(key);
+  return record;
+}
+
+void write_text(const fs::path& path, const std::string& text) {
+  fs::create_directories(path.parent_path());
+  std::ofstream(path) << text;
+}
+
+TEST_F(RecordFolder, RecordsOfTheFirstSchemaAreReadWithNullForWhatCameLater) {
+  write_text(folder_ / "records" / "old.json", first_record().dump());
+  const Json record = load_records(folder_).at(0);
+  EXPECT_EQ(record["schema"], kFirstSchema);
+  EXPECT_EQ(record["build_seconds"], 0.5);
+  for (const char* pointer : {"/configuration", "/check", "/check_reason", "/error/reference_error"}) {
+    ASSERT_TRUE(record.contains(Json::json_pointer(pointer))) << pointer;
+    EXPECT_TRUE(record.at(Json::json_pointer(pointer)).is_null()) << pointer;
+  }
+  EXPECT_THROW(validate_record(record), Error) << "a new record is of the new schema";
+  Json broken = first_record();
+  broken.erase("encoding");
+  write_text(folder_ / "records" / "old.json", broken.dump());
+  EXPECT_THROW(load_records(folder_), Error) << "what the first schema had is still asked for";
+}
+
+TEST_F(RecordFolder, TellsWhetherRecordsOfTheFirstSchemaAreThere) {
+  EXPECT_FALSE(record_of_first_schema(folder_)) << "no folder";
+  write_record(folder_, "new", good_record(), false);
+  write_text(folder_ / "records" / "broken.json", "{");
+  EXPECT_FALSE(record_of_first_schema(folder_));
+  write_text(folder_ / "records" / "old.json", first_record().dump());
+  EXPECT_EQ(record_of_first_schema(folder_), folder_ / "records" / "old.json");
+}
+
+TEST_F(RecordFolder, ARecordBelongsToOneImplementation) {
+  Json record = good_record();
+  record["implementation"] = "ab";
+  EXPECT_FALSE(has_record_of(folder_, "abc", "ab"));
+  write_record(folder_, "abc", record, false);
+  EXPECT_TRUE(has_record_of(folder_, "abc", "ab"));
+  EXPECT_FALSE(has_record_of(folder_, "abc", "cd"));
 }
 
 TEST_F(RecordFolder, AFolderWithoutRecordsIsAnError) { EXPECT_THROW(load_records(folder_), Error); }

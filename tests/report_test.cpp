@@ -25,8 +25,9 @@ constexpr std::int64_t kMebibyte = 1 << 20;
 Json record(const std::string& encoding, double wall_ms) {
   Json r = blank_record(Status::ok);
   r["experiment"] = "sizes";
-  r["dataset"] = {{"name", "blobs_&_shell"}, {"hash", "h1"},  {"leaf_cells", 1000}, {"stored_cells", 1100}, {"levels", 3},
-                  {"patches", 10},           {"field", "phi"}};
+  r["dataset"] = {{"name", "blobs_&_shell"}, {"source", nullptr}, {"hash", "h1"},  {"exact_hash", "e1"}, {"leaf_cells", 1000},
+                  {"stored_cells", 1100},    {"levels", 3},       {"patches", 10}, {"field", "phi"}};
+  r["check"] = {{"psnr_db", 48.5}, {"from", "default"}, {"why", nullptr}};
   r["encoding"] = encoding;
   r["build_parameters"] = Json::object();
   r["filter"] = "linear_page";
@@ -48,12 +49,13 @@ Json record(const std::string& encoding, double wall_ms) {
   r["frame"] = {{"wall_ms", timing_json(samples)}, {"gpu_ms", nullptr}, {"all_wall_ms", samples}};
   r["work"] = {{"rays", 2048}, {"samples", 123456}, {"regions", 789}, {"regions_skipped", 1}};
   r["error"] = error_json({.rmse = 0, .max = 0, .psnr_db = std::nullopt, .mrse = 0}, "r");
-  r["error"]["split"] = nullptr;
+  for (const char* key : {"split", "reference_error", "limited_by_reference", "within_tolerance_seen"}) r["error"][key] = nullptr;
   r["error_common"] = error_json({.rmse = 1.25e-7, .max = 1, .psnr_db = 42.5, .mrse = 0}, "r");
   r["error_common"]["filter"] = "linear_vertex";
   r["context"] = {{"renderer", "llvmpipe"}, {"gl_version", nullptr},  {"extensions_missing", nullptr}, {"cpu", nullptr},
                   {"cores", nullptr},       {"environment", nullptr}, {"build_type", nullptr},         {"compiler", nullptr},
-                  {"commit", nullptr},      {"dirty", nullptr},       {"shader_hash", nullptr},        {"date", nullptr}};
+                  {"commit", nullptr},      {"dirty", nullptr},       {"shader_hash", nullptr},        {"date", nullptr},
+                  {"device", nullptr},      {"shader_cache", nullptr}};
   validate_record(r);
   return r;
 }
@@ -109,6 +111,25 @@ TEST(Tables, ShowWhatVariesAndSayTheRestOnce) {
                                                       {"picture (pixels)", "64 x 32"},
                                                       {"page_table", "centring cell"}}));
   EXPECT_THAT(table.notes, ElementsAre("no values: frame GPU (ms), PSNR (dB)", "of 4 points: 3 ok, 1 unsupported"));
+}
+
+Json unchecked(Json r) {
+  r["check"] = nullptr;
+  r["check_reason"] = "no reference";
+  validate_record(r);
+  return r;
+}
+
+TEST(Tables, MarkRowsWhosePictureWasNotChecked) {
+  std::vector<Json> records = {record("uniform", 2), unchecked(page_table(8, 4)),
+                               not_measured(page_table(4, 1), Status::failed, "no")};
+  for (const ReportOptions& options : {ReportOptions{}, ReportOptions{{{"sizes", {"encoding", "wall"}}}}}) {
+    const Table table = only_table(records, options);
+    EXPECT_THAT(cells(table, "check"), ElementsAre("48.5 dB (default)", "48.5 dB (default)", "unchecked"));
+    EXPECT_THAT(table.notes, testing::Contains("unchecked, 1 of 3 points: no reference"));
+  }
+  records.erase(records.begin() + 1);
+  EXPECT_THAT(keys(only_table(records)), Not(testing::Contains("check")));
 }
 
 TEST(Tables, KeepRowsThatWereNotMeasuredWithTheirReason) {

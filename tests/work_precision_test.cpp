@@ -31,8 +31,9 @@ struct Setting {
 Json record(const Setting& s, const std::string& view = "front") {
   Json r = blank_record(Status::ok);
   r["experiment"] = "test";
-  r["dataset"] = {{"name", "shell"}, {"hash", "h"},  {"leaf_cells", 8}, {"stored_cells", 9},
-                  {"levels", 2},     {"patches", 2}, {"field", "phi"}};
+  r["dataset"] = {{"name", "shell"},   {"source", nullptr}, {"hash", "h"},  {"exact_hash", "e"}, {"leaf_cells", 8},
+                  {"stored_cells", 9}, {"levels", 2},       {"patches", 2}, {"field", "phi"}};
+  r["check_reason"] = "no reference of its own filter";
   r["encoding"] = s.encoding;
   r["build_parameters"] = Json::object();
   r["filter"] = "linear_vertex";
@@ -62,7 +63,8 @@ Json record(const Setting& s, const std::string& view = "front") {
   r["error_common"]["p95"] = 2 * rmse;
   r["context"] = {{"renderer", "llvmpipe"}, {"gl_version", nullptr},  {"extensions_missing", nullptr}, {"cpu", nullptr},
                   {"cores", nullptr},       {"environment", nullptr}, {"build_type", nullptr},         {"compiler", nullptr},
-                  {"commit", nullptr},      {"dirty", nullptr},       {"shader_hash", nullptr},        {"date", nullptr}};
+                  {"commit", nullptr},      {"dirty", nullptr},       {"shader_hash", nullptr},        {"date", nullptr},
+                  {"device", nullptr},      {"shader_cache", nullptr}};
   validate_record(r);
   return r;
 }

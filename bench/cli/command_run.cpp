@@ -22,6 +22,7 @@ struct Arguments {
   std::vector<std::string> set;
   std::uint64_t max_points = ReadOptions{}.most_points;
   bool force = false;
+  bool keep_old = false;
   bool json = false;
 };
 
@@ -93,6 +94,8 @@ int run(const Arguments& a) {
   RunOptions options;
   options.folder = a.output;
   options.force = a.force;
+  options.keep_old = a.keep_old;
+  options.shader_cache = options.folder / "shader_cache";
   if (!a.context.empty()) options.context = parse_context_kind(a.context);
   if (!a.memory_limit.empty()) options.memory_limit = parse_bytes(a.memory_limit);
   if (isatty(STDERR_FILENO) != 0) options.progress = [](const std::string& text) { fmt::print(stderr, "{}\n", printable(text)); };
@@ -160,7 +163,9 @@ void add_run_commands(CLI::App& app, Command& chosen) {
   r->add_option("--memory-limit", a->memory_limit, "for one structure, as 512MiB");
   add_set_option(*r, a->set);
   r->add_option("--max-points", a->max_points, "points of one file, above which it is refused")->capture_default_str();
-  r->add_flag("--force", a->force, "measure again what has a record");
+  CLI::Option* force = r->add_flag("--force", a->force, "measure again what has a record");
+  r->add_flag("--keep-old", a->keep_old, "keep records that other shaders or builders made; they are measured again otherwise")
+      ->excludes(force);
   r->add_flag("--json", a->json, "print counts for programs");
   r->footer("Example: amrtex run experiments/quickstart/experiment.json --out out/quickstart");
   r->callback([a, &chosen] { chosen = [a] { return run(*a); }; });

@@ -415,10 +415,12 @@ Advice advise(const AdviceRequest& request, const Effort& full, const Measure& m
 }
 
 Measure measure_by_running(const Experiment& scene, const AdviceRequest& request, const RunOptions& options) {
-  const std::string mesh = load_dataset(scene, scene.datasets.front()).content_hash(0);  // part of the records' names
-  return [scene, request, options, mesh](std::span<const Candidate> candidates, const Effort& effort) {
+  // part of the records' names
+  const std::string data = exact_data_hash(load_dataset(scene, scene.datasets.front()), scene_of(scene, scene.renders.front()));
+  return [scene, request, options, data](std::span<const Candidate> candidates, const Effort& effort) {
     Experiment experiment = scene;
     experiment.reference = ReferenceSettings{effort.reference_step, request.reference, !request.reference};
+    experiment.unchecked_because = "advise reads the error itself";
     if (options.context) experiment.context = context_kind_name(*options.context);
     if (request.memory_limit != std::numeric_limits<std::int64_t>::max()) experiment.memory_limit = request.memory_limit;
     experiment.builds.clear();
@@ -444,7 +446,7 @@ Measure measure_by_running(const Experiment& scene, const AdviceRequest& request
     run_experiment(experiment, run);
     std::vector<Json> records;
     for (std::size_t i = 0; i < candidates.size(); ++i) {
-      const Json configuration = point_configuration(experiment, candidates[i].build, drawn[i], mesh);
+      const Json configuration = point_configuration(experiment, candidates[i].build, drawn[i], data);
       records.push_back(read_record(record_path(options.folder, configuration_hash(configuration))));
     }
     return records;

@@ -27,6 +27,7 @@ std::string compiler_name() {
 
 bool concerns_driver(std::string_view variable) {
   constexpr std::array<std::string_view, 7> prefixes = {"MESA_", "LP_", "GALLIUM_", "LIBGL_", "EGL_", "VK_", "ZINK_"};
+  if (variable.starts_with("MESA_SHADER_CACHE_DIR=")) return false;
   return std::any_of(prefixes.begin(), prefixes.end(), [&](std::string_view prefix) { return variable.starts_with(prefix); });
 }
 
@@ -41,6 +42,8 @@ BuildInfo build_info() {
   return info;
 }
 
+std::string implementation_hash() { return std::string(kImplementation); }
+
 std::optional<std::string> cpu_name() {
   std::ifstream in("/proc/cpuinfo");
   for (std::string line; std::getline(in, line);) {
@@ -48,6 +51,14 @@ std::optional<std::string> cpu_name() {
     const std::size_t begin = line.find_first_not_of(" \t", line.find(':') + 1);
     if (begin != std::string::npos) return line.substr(begin);
   }
+  return std::nullopt;
+}
+
+std::optional<std::int64_t> process_peak_bytes() {
+  std::ifstream in("/proc/self/status");
+  constexpr std::string_view key = "VmHWM:";
+  for (std::string line; std::getline(in, line);)
+    if (line.starts_with(key)) return std::stoll(line.substr(key.size())) * 1024;  // in kB, as the system calls them
   return std::nullopt;
 }
 
@@ -79,6 +90,7 @@ Json context_json() {
   const std::optional<std::string> cpu = cpu_name();
   const unsigned cores = std::thread::hardware_concurrency();  // 0 = not known
   return {{"renderer", nullptr},
+          {"device", nullptr},
           {"gl_version", nullptr},
           {"extensions_missing", nullptr},
           {"cpu", cpu ? Json(*cpu) : Json()},
@@ -89,6 +101,7 @@ Json context_json() {
           {"commit", build.commit ? Json(*build.commit) : Json()},
           {"dirty", build.dirty ? Json(*build.dirty) : Json()},
           {"shader_hash", nullptr},
+          {"shader_cache", nullptr},
           {"date", utc_date()}};
 }
 

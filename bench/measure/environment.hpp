@@ -1,6 +1,7 @@
 // What a record says about the machine and the program, as far as no GL is needed.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -17,17 +18,25 @@ struct BuildInfo {
 };
 BuildInfo build_info();
 
+/// Hex digits of a hash over the sources of shaders, structures and renderers, tests aside, and of the default check: what
+/// decides a picture, its bytes and its verdict. Taken when the program was built.
+std::string implementation_hash();
+
 /// Name of the processor; absent where the system does not say.
 std::optional<std::string> cpu_name();
 
-/// The variables that choose or tune a GL driver, by name: MESA_*, LP_*, GALLIUM_*, LIBGL_*, EGL_*, VK_*, ZINK_*.
+/// Most bytes that this process has held in memory; absent where the system does not say.
+std::optional<std::int64_t> process_peak_bytes();
+
+/// The variables that choose or tune a GL driver, by name: MESA_*, LP_*, GALLIUM_*, LIBGL_*, EGL_*, VK_*, ZINK_*; without the
+/// folder of compiled shaders, which each run has for itself.
 Json driver_variables();
 
 /// Now, UTC, ISO 8601 to the second.
 std::string utc_date();
 
-/// The `context` part of a record; renderer, gl_version, extensions_missing and
-/// shader_hash are null, for who has a context.
+/// The `context` part of a record; renderer, device, gl_version, extensions_missing,
+/// shader_hash and shader_cache are null, for who has a context.
 Json context_json();
 
 }  // namespace amrtex

@@ -8,9 +8,11 @@
 #include <random>
 
 #include "bench/measure/change_time.hpp"
+#include "bench/measure/check_bound.hpp"
 #include "bench/measure/environment.hpp"
 #include "bench/measure/error_split.hpp"
 #include "bench/measure/left_out_time.hpp"
+#include "bench/measure/shader_cache.hpp"
 #include "bench/numbers/image_error.hpp"
 #include "bench/numbers/statistics.hpp"
 #include "bench/records/record.hpp"
@@ -19,7 +21,9 @@
 #include "renderers/gpu/structure.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
 #include "renderers/scene/scene_settings.hpp"
+#include "renderers/scene/triangle_mesh.hpp"
 #include "structures/generators/synthetic.hpp"
+#include "structures/mesh/exact_hash.hpp"
 #include "structures/readers/mesh_io.hpp"
 
 namespace amrtex {
@@ -46,6 +50,12 @@ struct Built {
   Structure structure;
   double build_seconds = 0;
   double upload_seconds = 0;
+};
+
+/// A picture before its own reference.
+struct Judgement {
+  ErrorMetrics error;
+  Picture reference;
 };
 
 struct Failure {
@@ -81,10 +91,25 @@ std::vector<double> seen_errors(const Picture& picture, const Picture& reference
   return errors;
 }
 
+Json json_or_null(const std::optional<std::int64_t>& value) { return value ? Json(*value) : Json(); }
+
+/// Records of schema 1 are named by less than what decides a point, so a run could take one for another.
+void refuse_first_schema(const fs::path& folder) {
+  if (const auto record = record_of_first_schema(folder))
+    throw UsageError(fmt::format(
+        "output folder {}: {} is of schema {}, which a run does not go on from; accepted: another folder for --out, or this one "
+        "without its folder `records` (`amrtex report` still makes tables of them)",
+        folder.string(), record->filename().string(), kFirstSchema));
+}
+
 class Runner {
  public:
   Runner(const Experiment& experiment, const RunOptions& options)
-      : experiment_(experiment), options_(options), context_(make_context(parse_context_kind(experiment.context))) {}
+      : experiment_(experiment),
+        options_(options),
+        shader_cache_(options.shader_cache.empty() ? Json() : Json(use_shader_cache(options.shader_cache))),
+        context_(make_context(parse_context_kind(experiment.context))),
+        implementation_(implementation_hash()) {}
 
   RunSummary run() {
     for (const BuildPoint* build : measuring_order()) run_build(*build);
@@ -112,10 +137,27 @@ class Runner {
     mesh_.emplace(load_dataset(experiment_, experiment_.datasets[dataset]));
     loaded_ = dataset;
     mesh_hash_ = mesh_->content_hash(0);
+    data_hashes_.clear();
   }
 
-  std::string hash_of(const BuildPoint& build, const RenderPoint& render) const {
-    return configuration_hash(point_configuration(experiment_, build, render, mesh_hash_));
+  /// Of what is drawn; a mesh is hashed once for each choice of fields and triangles.
+  const std::string& data_hash(const RenderPoint& render) {
+    const Scene scene = scene_of(experiment_, render);
+    std::string key = triangles_json(scene.settings.triangles).dump();
+    for (const int field : more_fields(*mesh_, scene)) key += fmt::format(" {}", field);
+    std::string& hash = data_hashes_[key];
+    if (hash.empty()) hash = exact_data_hash(*mesh_, scene);
+    return hash;
+  }
+
+  std::string hash_of(const BuildPoint& build, const RenderPoint& render) {
+    return configuration_hash(point_configuration(experiment_, build, render, data_hash(render)));
+  }
+
+  /// Is the point's record there, drawn by this program's shaders and builders?
+  bool is_kept(const std::string& hash) const {
+    if (options_.force) return false;
+    return options_.keep_old ? has_record(options_.folder, hash) : has_record_of(options_.folder, hash, implementation_);
   }
 
   void run_build(const BuildPoint& build) {
@@ -123,7 +165,7 @@ class Runner {
     std::vector<const RenderPoint*> open;
     for (const RenderPoint& render : experiment_.renders) {
       if (options_.wanted && !options_.wanted(build, render)) continue;
-      if (!options_.force && has_record(options_.folder, hash_of(build, render)))
+      if (is_kept(hash_of(build, render)))
         ++summary_.kept;
       else
         open.push_back(&render);
@@ -210,7 +252,8 @@ class Runner {
       warn(record, "slices were blended in 8 bits a channel (slice_target rgba8): a historical control");
     if (!consumer->transfer_exact())
       warn(record, "the transfer function has more than 16 points: it is drawn from a table of 4096 bins");
-    if (!add_errors(record, picture, built, scene)) {
+    const std::optional<Judgement> own = add_errors(record, picture, built, scene);
+    if (!add_check(record, build, scene, own)) {
       write(build, render, record);
       return;  // a wrong picture gets no time
     }
@@ -238,12 +281,17 @@ class Runner {
 
   static void warn(Json& record, const std::string& text) { record["context"]["warnings"].push_back(text); }
 
-  /// False when the picture is wrong.
-  bool add_errors(Json& record, const Picture& picture, const Built& built, const Scene& scene) {
-    if (!experiment_.reference) return true;
+  /// The scene as references draw it.
+  Scene judged(Scene scene) const {
+    if (experiment_.reference->shading) scene.settings.isosurfaces.shading = *experiment_.reference->shading;
+    return scene;
+  }
+
+  /// What it finds against the own reference, where the experiment has one.
+  std::optional<Judgement> add_errors(Json& record, const Picture& picture, const Built& built, const Scene& scene) {
+    if (!experiment_.reference) return std::nullopt;
     const ReferenceSettings& reference = *experiment_.reference;
-    Scene judge = scene;
-    if (reference.shading) judge.settings.isosurfaces.shading = *reference.shading;
+    const Scene judge = judged(scene);
     const fs::path cache = options_.folder / "references";
     std::string hash;
     if (reference.common_filter) {
@@ -255,25 +303,40 @@ class Runner {
       record["error_common"]["p95_seen"] = percentile(seen_errors(picture, shared), 0.95);
       record["error_common"]["filter"] = filter_name(common.filter);
     }
-    if (!reference.own) return true;
-    const Picture own = cached_reference(*mesh_, built.structure.field.definition, judge, reference.step, cache, hash);
+    if (!reference.own) return std::nullopt;
+    Picture own = cached_reference(*mesh_, built.structure.field.definition, judge, reference.step, cache, hash);
     const ErrorMetrics error = compare(picture, own);
     record["error"] = error_json(error, hash);
+    for (const char* unknown : {"reference_error", "limited_by_reference", "within_tolerance_seen"})
+      record["error"][unknown] = nullptr;
     record["error"]["split"] = experiment_.explain_error ? explain(built, scene, own, picture) : Json();
     if (!experiment_.explain_error && scene.settings.prunes_levels())
       record["error"]["split"]["level_of_detail"] = pruning_error(built, scene, picture);
     const std::vector<double> pixels = pixel_errors(picture, own);
     record["error"]["p95"] = percentile(pixels, 0.95);
-    record["error"]["p95_seen"] = percentile(seen_errors(picture, own), 0.95);
-    if (scene.settings.integrator == Integrator::tolerance)
+    const std::vector<double> seen = seen_errors(picture, own);
+    record["error"]["p95_seen"] = percentile(seen, 0.95);
+    if (scene.settings.integrator == Integrator::tolerance) {
       record["error"]["within_tolerance"] = share_within(pixels, scene.settings.tolerance);
-    if (experiment_.minimum_psnr_db && !reaches_psnr(error, *experiment_.minimum_psnr_db)) {
-      record["status"] = status_name(Status::failed);
-      record["reason"] = fmt::format("failed check: psnr_db {:.2f} against its own reference, at least {} is asked for",
-                                     error.psnr_db.value_or(0), *experiment_.minimum_psnr_db);
-      return false;
+      record["error"]["within_tolerance_seen"] = share_within(seen, scene.settings.tolerance);
     }
-    return true;
+    return Judgement{error, std::move(own)};
+  }
+
+  /// What the picture had to reach, and whether it did.
+  bool add_check(Json& record, const BuildPoint& build, const Scene& scene, const std::optional<Judgement>& own) const {
+    const PictureCheck check = check_of(experiment_, build, scene.settings);
+    if (!check.psnr_db || !own) {
+      record["check_reason"] = check.why;
+      return true;
+    }
+    record["check"] = {{"psnr_db", *check.psnr_db}, {"from", check.from}, {"why", check.why.empty() ? Json() : Json(check.why)}};
+    if (passes(check, own->error, own->reference)) return true;
+    record["status"] = status_name(Status::failed);
+    record["reason"] =
+        fmt::format("failed check: psnr_db {:.2f} against its own reference, at least {:.4g} is asked for by the {}",
+                    own->error.psnr_db.value_or(0), *check.psnr_db, check.from);
+    return false;
   }
 
   /// The error by cause.
@@ -313,7 +376,7 @@ class Runner {
     }
     Json frame;
     frame["wall_ms"] = timing_json(wall);
-    frame["gpu_ms"] = timing_json(gpu);
+    frame["gpu_ms"] = context_->info().software ? Json() : timing_json(gpu);  // there the timer tells of the last tile alone
     frame["all_wall_ms"] = wall;
     frame["warm_up"] = render.warm_up;
     frame["baseline_ms"] = nullptr;
@@ -372,8 +435,14 @@ class Runner {
     std::int64_t patches = 0;
     for (int l = 0; l < mesh_->level_count(); ++l) patches += static_cast<std::int64_t>(mesh_->patches(l).size());
     record["experiment"] = experiment_.name;
+    record["configuration"] = hash_of(build, render);
+    record["implementation"] = implementation_;
+    record["repetition"] = 0;
+    record["process_peak_bytes"] = json_or_null(process_peak_bytes());
     record["dataset"] = {{"name", source.name},
+                         {"source", source.file ? Json(source.written) : source.generate},
                          {"hash", mesh_hash_},
+                         {"exact_hash", data_hash(render)},
                          {"leaf_cells", mesh_->leaf_cells()},
                          {"stored_cells", mesh_->stored_cells()},
                          {"levels", mesh_->level_count()},
@@ -387,6 +456,8 @@ class Runner {
     record["render"] = render_json(render);
     record["context"] = context_json();
     record["context"]["renderer"] = context_->info().renderer;
+    record["context"]["device"] = context_->info().software ? record["context"]["cpu"] : Json(context_->info().renderer);
+    record["context"]["shader_cache"] = shader_cache_;
     record["context"]["gl_version"] = context_->info().version;
     record["context"]["software"] = context_->info().software;
     record["context"]["extensions_missing"] = Json::array();
@@ -410,7 +481,9 @@ class Runner {
   }
 
   void write(const BuildPoint& build, const RenderPoint& render, const Json& record) {
-    write_record(options_.folder, hash_of(build, render), record, options_.force);
+    const std::string hash = hash_of(build, render);
+    const bool outdated = has_record(options_.folder, hash) && !is_kept(hash);
+    write_record(options_.folder, hash, record, options_.force || outdated);
     const std::string status = record.at("status");
     if (status == "ok")
       ++summary_.measured;
@@ -422,18 +495,21 @@ class Runner {
       ++summary_.failed;
   }
 
-  fs::path picture_path(const BuildPoint& build, const RenderPoint& render) const {
+  fs::path picture_path(const BuildPoint& build, const RenderPoint& render) {
     fs::create_directories(options_.folder / "pictures");
     return options_.folder / "pictures" / (hash_of(build, render) + ".png");
   }
 
   const Experiment& experiment_;
   const RunOptions& options_;
+  Json shader_cache_;  ///< of the context, which finds it when it is made
   std::unique_ptr<Context> context_;
+  std::string implementation_;
   RunSummary summary_;
   std::optional<AmrHierarchy> mesh_;
   std::size_t loaded_ = 0;
   std::string mesh_hash_;
+  std::map<std::string, std::string> data_hashes_;  ///< by fields and triangles in use
   std::unique_ptr<Built> baseline_;
   std::unique_ptr<Consumer> baseline_consumer_;
   std::string baseline_key_;
@@ -470,6 +546,16 @@ std::vector<int> more_fields(const AmrHierarchy& hierarchy, const Scene& scene) 
   return {hierarchy.field_index(color)};
 }
 
+std::string exact_data_hash(const AmrHierarchy& hierarchy, const Scene& scene) {
+  std::vector<int> fields = {0};
+  for (const int field : more_fields(hierarchy, scene)) fields.push_back(field);
+  const std::string mesh = exact_hash(hierarchy, fields);
+  if (scene.settings.triangles.empty()) return mesh;
+  Json parts = {{"mesh", mesh}, {"triangles", Json::array()}};
+  for (const TriangleObject& object : scene.settings.triangles) parts["triangles"].push_back(object.mesh->content_hash());
+  return configuration_hash(parts);
+}
+
 std::vector<std::string> scene_warnings(const AmrHierarchy& hierarchy, const Scene& scene) {
   std::vector<std::string> warnings;
   if (!scene.settings.draws_surfaces()) return warnings;
@@ -483,13 +569,9 @@ std::vector<std::string> scene_warnings(const AmrHierarchy& hierarchy, const Sce
 
 Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definition, const Scene& scene, double step,
                          const fs::path& folder, std::string& hash) {
-  Json key = {{"scene", scene_reference(scene)}, {"mesh", hierarchy.content_hash(0)}};
-  const Vec3d lower = hierarchy.domain_lower();
-  const Vec3d upper = hierarchy.domain_upper();
-  key["domain"] = {lower.x, lower.y, lower.z, upper.x, upper.y, upper.z};
+  Json key = {{"scene", scene_reference(scene)}, {"data", exact_data_hash(hierarchy, scene)}};
   key["filter"] = filter_name(definition.filter);
   key["page"] = {definition.page_size, definition.page_level};
-  for (const int field : more_fields(hierarchy, scene)) key["more_fields"].push_back(hierarchy.content_hash(field));
   key["step"] = step;
   key["method"] = 1;
   hash = configuration_hash(key);
@@ -505,6 +587,7 @@ RunSummary run_experiment(const Experiment& experiment, const RunOptions& option
   std::error_code error;
   fs::create_directories(options.folder, error);
   if (error) throw Error(fmt::format("output folder {}: {}", options.folder.string(), error.message()));
+  refuse_first_schema(options.folder);
   Experiment settled = experiment;  // records are named by what was really used
   if (options.context) settled.context = context_kind_name(*options.context);
   if (options.memory_limit) settled.memory_limit = options.memory_limit;

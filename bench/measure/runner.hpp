@@ -15,8 +15,11 @@
 namespace amrtex {
 
 struct RunOptions {
-  std::filesystem::path folder;              ///< records, pictures and references are written below it
-  bool force = false;                        ///< measure again what has a record
+  std::filesystem::path folder;  ///< records, pictures and references are written below it
+  bool force = false;            ///< measure again what has a record
+  bool keep_old = false;         ///< keep records of another implementation too (environment.hpp)
+  /// Compiled shaders are kept there for measurements alone (shader_cache.hpp); empty: wherever the driver keeps them.
+  std::filesystem::path shader_cache{};
   std::optional<ContextKind> context;        ///< overrides the experiment's
   std::optional<std::int64_t> memory_limit;  ///< bytes of one build; overrides the experiment's
   /// Points that are measured; absent: all. Others are passed over as if they were not in the experiment.
@@ -32,8 +35,8 @@ struct RunSummary {
   int failed = 0;
 };
 
-/// Measures every point that has no record yet. Points that fail or cannot be done
-/// become records too; throws only for what concerns the whole experiment.
+/// Measures every point that has no record of this implementation yet. Points that fail or cannot be done
+/// become records too; throws only for what concerns the whole experiment, as a folder that holds records of schema 1.
 RunSummary run_experiment(const Experiment& experiment, const RunOptions& options);
 
 /// The mesh of one data set of an experiment, with the field that is wanted first, and after it
@@ -45,6 +48,10 @@ std::unique_ptr<AnalyticField> analytic_field(const DatasetSource& source);
 
 /// Fields beside the drawn one that the scene fetches. Throws UsageError naming the fields there are.
 std::vector<int> more_fields(const AmrHierarchy& hierarchy, const Scene& scene);
+
+/// Hex digits that tell apart what a scene of this mesh is made of: every field in use to the bit, the mesh with its place and
+/// spacing, and the corners of triangles, whatever their files are called.
+std::string exact_data_hash(const AmrHierarchy& hierarchy, const Scene& scene);
 
 /// What is legal about a scene of field 0 of this mesh, and yet likely not meant.
 std::vector<std::string> scene_warnings(const AmrHierarchy& hierarchy, const Scene& scene);

@@ -20,7 +20,7 @@
 namespace amrtex {
 namespace {
 
-enum class Kind { string, number, integer, boolean, object, array };
+enum class Kind { string, number, integer, boolean, object, array, string_or_object };
 
 /// One fixed key. Parents stand before their children; children are looked at only
 /// where the parent is not null.
@@ -28,6 +28,7 @@ struct Rule {
   const char* pointer;
   Kind kind;
   bool nullable = true;
+  int since = 1;  ///< schema
 };
 
 constexpr Rule kRules[] = {
@@ -35,9 +36,14 @@ constexpr Rule kRules[] = {
     {"/status", Kind::string, false},
     {"/reason", Kind::string},
     {"/experiment", Kind::string},
+    {"/configuration", Kind::string, true, 2},
+    {"/implementation", Kind::string, true, 2},
+    {"/repetition", Kind::integer, true, 2},
     {"/dataset", Kind::object},
     {"/dataset/name", Kind::string},
+    {"/dataset/source", Kind::string_or_object, true, 2},
     {"/dataset/hash", Kind::string},
+    {"/dataset/exact_hash", Kind::string, true, 2},
     {"/dataset/leaf_cells", Kind::integer},
     {"/dataset/stored_cells", Kind::integer},
     {"/dataset/levels", Kind::integer},
@@ -70,6 +76,7 @@ constexpr Rule kRules[] = {
     {"/memory/host_peak_bytes", Kind::integer},
     {"/build_seconds", Kind::number},
     {"/upload_seconds", Kind::number},
+    {"/process_peak_bytes", Kind::integer, true, 2},
     {"/first_frame_ms", Kind::number},
     {"/frame", Kind::object},
     {"/frame/wall_ms", Kind::object},
@@ -90,12 +97,20 @@ constexpr Rule kRules[] = {
     {"/work/samples", Kind::integer},
     {"/work/regions", Kind::integer},
     {"/work/regions_skipped", Kind::integer},
+    {"/check", Kind::object, true, 2},
+    {"/check/psnr_db", Kind::number, false, 2},
+    {"/check/from", Kind::string, false, 2},
+    {"/check/why", Kind::string, true, 2},
+    {"/check_reason", Kind::string, true, 2},
     {"/error", Kind::object},
     {"/error/rmse", Kind::number},
     {"/error/max", Kind::number},
     {"/error/psnr_db", Kind::number},
     {"/error/mrse", Kind::number},
     {"/error/reference", Kind::string},
+    {"/error/reference_error", Kind::number, true, 2},
+    {"/error/limited_by_reference", Kind::boolean, true, 2},
+    {"/error/within_tolerance_seen", Kind::number, true, 2},
     {"/error/split", Kind::object},
     {"/error_common", Kind::object},
     {"/error_common/rmse", Kind::number},
@@ -108,6 +123,7 @@ constexpr Rule kRules[] = {
     {"/image_hash", Kind::string},
     {"/context", Kind::object},
     {"/context/renderer", Kind::string},
+    {"/context/device", Kind::string, true, 2},
     {"/context/gl_version", Kind::string},
     {"/context/extensions_missing", Kind::array},
     {"/context/cpu", Kind::string},
@@ -118,6 +134,7 @@ constexpr Rule kRules[] = {
     {"/context/commit", Kind::string},
     {"/context/dirty", Kind::boolean},
     {"/context/shader_hash", Kind::string},
+    {"/context/shader_cache", Kind::string, true, 2},
     {"/context/date", Kind::string},
 };
 
@@ -128,7 +145,8 @@ constexpr Status kStatuses[] = {Status::ok, Status::unsupported, Status::failed,
 }
 
 const char* kind_name(Kind kind) {
-  constexpr std::array<const char*, 6> names = {"a string", "a number", "an integer", "true or false", "an object", "a list"};
+  constexpr std::array<const char*, 7> names = {"a string",  "a number", "an integer",           "true or false",
+                                                "an object", "a list",   "a string or an object"};
   return names[static_cast<std::size_t>(kind)];
 }
 
@@ -146,6 +164,8 @@ bool is_kind(const Json& json, Kind kind) {
       return json.is_object();
     case Kind::array:
       return json.is_array();
+    case Kind::string_or_object:
+      return json.is_string() || json.is_object();
   }
   return false;
 }
@@ -204,6 +224,14 @@ void check_frame(const Json& frame) {
     if (!all[i].is_number()) fail(fmt::format("/frame/all_wall_ms/{}", i), "a number is expected");
   if (frame.at("wall_ms").at("n") != all.size())
     fail("/frame/wall_ms/n", fmt::format("is not the number of samples, {}", all.size()));
+}
+
+/// A picture has a bound or a reason why it has none.
+void check_check(const Json& record) {
+  const bool has_bound = !record.at("check").is_null(), has_reason = !record.at("check_reason").is_null();
+  if (has_bound && has_reason) fail("/check_reason", "must be null where there is a check");
+  if (!has_bound && !has_reason && record.at("status") == status_name(Status::ok))
+    fail("/check_reason", "must say why the picture was not checked");
 }
 
 /// Causes that were not measured are left out or null.
@@ -287,6 +315,25 @@ class TemporaryFile {
   int descriptor_ = -1;
 };
 
+void check_contents(const Json& record) {
+  for (const Rule& rule : kRules) check_rule(record, rule);
+  check_status(record);
+  check_memory(record.at("memory"));
+  check_frame(record.at("frame"));
+  check_split(record.at("error"));
+}
+
+bool is_first_schema(const Json& record) { return record.is_object() && record.value("schema", Json()) == kFirstSchema; }
+
+/// Keys that schema 1 did not have are null in what it described.
+void add_later_keys(Json& record) {
+  for (const Rule& rule : kRules) {
+    const Json::json_pointer pointer(rule.pointer);
+    const Json& parent = pointer.parent_pointer().empty() ? record : value_at(record, pointer.parent_pointer().to_string());
+    if (rule.since > 1 && parent.is_object() && !record.contains(pointer)) record[pointer] = nullptr;
+  }
+}
+
 /// Makes a rename in `folder` survive a power failure.
 void sync_folder(const std::filesystem::path& folder) {
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -366,11 +413,8 @@ void validate_record(const Json& record) {
   if (!record.is_object()) fail("", "an object is expected");
   const auto schema = record.find("schema");
   if (schema == record.end() || *schema != kRecordSchema) fail("/schema", fmt::format("'{}' is expected", kRecordSchema));
-  for (const Rule& rule : kRules) check_rule(record, rule);
-  check_status(record);
-  check_memory(record.at("memory"));
-  check_frame(record.at("frame"));
-  check_split(record.at("error"));
+  check_contents(record);
+  check_check(record);
 }
 
 std::string configuration_hash(const Json& configuration) {
@@ -385,6 +429,20 @@ std::filesystem::path record_path(const std::filesystem::path& folder, std::stri
 
 bool has_record(const std::filesystem::path& folder, std::string_view hash) {
   return std::filesystem::exists(record_path(folder, hash));
+}
+
+bool has_record_of(const std::filesystem::path& folder, std::string_view hash, std::string_view implementation) {
+  return has_record(folder, hash) && read_record(record_path(folder, hash)).at("implementation") == implementation;
+}
+
+std::optional<std::filesystem::path> record_of_first_schema(const std::filesystem::path& folder) {
+  std::error_code absent;
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "records", absent)) {
+    if (entry.path().extension() != ".json") continue;
+    std::ifstream in(entry.path(), std::ios::binary);
+    if (is_first_schema(Json::parse(in, nullptr, false))) return entry.path();
+  }
+  return std::nullopt;
 }
 
 bool write_record(const std::filesystem::path& folder, std::string_view hash, const Json& record, bool force) {
@@ -417,7 +475,12 @@ Json read_record(const std::filesystem::path& path) {
     throw Error(e.what());
   }
   try {
-    validate_record(record);
+    if (is_first_schema(record)) {
+      add_later_keys(record);
+      check_contents(record);
+    } else {
+      validate_record(record);
+    }
     return record;
   } catch (const std::exception& e) {
     throw Error(fmt::format("{}: {}", path.string(), e.what()));

@@ -13,6 +13,7 @@
 
 #include "bench/records/record.hpp"
 #include "bench/records/record_conditions.hpp"
+#include "bench/report/report.hpp"
 #include "bench/settings/json_file.hpp"
 
 namespace amrtex {
@@ -238,6 +239,13 @@ Table make_table(const Entry& entry, const std::string& renderer, const Records&
     const bool in_paper = std::any_of(paper.begin(), paper.end(), [](const Cell& cell) { return cell.index() != 0; });
     if (in_paper) add_column(table, entry.datasets[i], "paper", paper);
   }
+  Records shown;
+  std::copy_if(records.begin(), records.end(), std::back_inserter(shown), [&](const Json* record) {
+    const Json name = at(*record, "/dataset/name");
+    return name.is_string() &&
+           std::find(entry.datasets.begin(), entry.datasets.end(), name.get<std::string>()) != entry.datasets.end();
+  });
+  for (const std::string& note : unchecked_notes(shown)) table.notes.push_back(note);
   for (const auto& [note, cells] : notes) table.notes.push_back(fmt::format("{}: {}", note, fmt::join(cells, "; ")));
   return table;
 }

@@ -126,6 +126,16 @@ Cell status_cell(const Json& record, const Group&) {
   return reason.empty() ? status : fmt::format("{}: {}", status, reason);
 }
 
+bool is_unchecked(const Json& record) { return at(record, "/check").is_null() && at(record, "/check_reason").is_string(); }
+
+/// Records of schema 1 do not say.
+Cell check_cell(const Json& record, const Group&) {
+  if (is_unchecked(record)) return "unchecked";
+  const Json& bound = at(record, "/check/psnr_db");
+  if (!bound.is_number()) return std::monostate();
+  return fmt::format("{:.1f} dB ({})", bound.get<double>(), text_of(at(record, "/check/from")));
+}
+
 /// What was left out for want of need, and because it is hidden.
 Cell left_out_cell(const Json& record, const Group&) {
   const Json& list = at(record, "/left_out");
@@ -152,7 +162,7 @@ bool same(const Json& a, const Json& b, const char* pointer) { return at(a, poin
 /// How well `candidate` serves as what `record` is measured against; 0 = not at all.
 int baseline_rank(const Json& candidate, const Json& record) {
   if (candidate.at("encoding") != "uniform" || !at(candidate, "/frame/wall_ms/median").is_number()) return 0;
-  for (const char* scene : {"/dataset/hash", "/dataset/field", "/render"})
+  for (const char* scene : {"/dataset/hash", "/dataset/exact_hash", "/dataset/field", "/render"})
     if (!same(candidate, record, scene)) return 0;
   if (!same(candidate, record, "/filter")) return is_linear(candidate) && is_linear(record) ? 1 : 0;
   if (!same(candidate, record, "/filtering")) return 2;
@@ -223,6 +233,7 @@ constexpr FixedColumn kMeasures[] = {
     {"psnr_common", "PSNR, common (dB)", "", Role::measure, true, value<"/error_common/psnr_db">},
     {"rmse_common", "RMSE, common", "", Role::measure, true, value<"/error_common/rmse">},
     {"p95_common", "95th percentile, common", "", Role::measure, true, value<"/error_common/p95">},
+    {"check", "check", "", Role::measure, false, check_cell},
     {"split_step", "step", "", Role::measure, true, value<"/error/split/step/rmse">},
     {"split_encoding", "encoding", "", Role::measure, true, value<"/error/split/encoding/rmse">},
     {"split_storage", "storage", "", Role::measure, true, value<"/error/split/storage/rmse">},
@@ -269,9 +280,10 @@ bool is_split(const ColumnRule& rule) { return std::string_view(rule.key).starts
 /// Measures that a table has unless others are chosen.
 bool is_default(const ColumnRule& rule) {
   if (is_split(rule)) return false;
-  constexpr auto on_demand = std::to_array<std::string_view>(
-      {"change", "left_out", "left_out_seconds", "p95_error", "within_tolerance", "baseline", "upload", "rays", "regions_skipped",
-       "max_error", "mrse", "rmse_common", "p95_common", "pages", "border_overhead", "border_formula", "oversampling", "passes"});
+  constexpr auto on_demand =
+      std::to_array<std::string_view>({"check", "change", "left_out", "left_out_seconds", "p95_error", "within_tolerance",
+                                       "baseline", "upload", "rays", "regions_skipped", "max_error", "mrse", "rmse_common",
+                                       "p95_common", "pages", "border_overhead", "border_formula", "oversampling", "passes"});
   return std::find(on_demand.begin(), on_demand.end(), rule.key) == on_demand.end();
 }
 
@@ -358,6 +370,18 @@ void add_column(Table& table, const ColumnRule& rule, const std::vector<Cell>& c
   for (std::size_t row = 0; row < cells.size(); ++row) table.rows[row].push_back(cells[row]);
 }
 
+/// A picture that nothing vouches for is marked, whatever columns were chosen: its time may be that of a wrong one.
+void mark_unchecked(Table& table, const Group& group, std::span<const Json* const> rows) {
+  const std::vector<std::string> notes = unchecked_notes(rows);
+  table.notes.insert(table.notes.end(), notes.begin(), notes.end());
+  const bool chosen =
+      std::any_of(table.columns.begin(), table.columns.end(), [](const Column& column) { return column.key == "check"; });
+  if (notes.empty() || chosen) return;
+  std::vector<Cell> cells;
+  for (const Json* record : rows) cells.push_back(record != nullptr ? check_cell(*record, group) : Cell());
+  add_column(table, find_rule("check"), cells);
+}
+
 /// Parameters that are the same in every record of their encoding.
 void add_constant_parameters(Table& table, const Group& group) {
   for (const auto& [encoding, keys] : varying_parameters(group.records, false))
@@ -413,6 +437,7 @@ Table make_table(const std::string& experiment, const std::string& renderer, con
     add_default_columns(table, group);
   else
     add_chosen_columns(table, group, chosen->second);
+  mark_unchecked(table, group, group.records);
   add_constant_parameters(table, group);
   add_counts(table, records);
   return table;
@@ -442,6 +467,16 @@ std::optional<Table> make_split_table(const std::string& experiment, const std::
 }
 
 }  // namespace
+
+std::vector<std::string> unchecked_notes(std::span<const Json* const> records) {
+  std::map<std::string, int> reasons;
+  for (const Json* record : records)
+    if (record != nullptr && is_unchecked(*record)) ++reasons[text_of(at(*record, "/check_reason"))];
+  std::vector<std::string> notes;
+  for (const auto& [reason, count] : reasons)
+    notes.push_back(fmt::format("unchecked, {} of {} points: {}", count, records.size(), reason));
+  return notes;
+}
 
 std::vector<std::string_view> column_keys() {
   std::vector<std::string_view> keys;
@@ -483,6 +518,7 @@ Table make_setting_table(std::string title, std::span<const Json* const> rows, s
       table.constants.emplace_back(rule.label, format_cell(cells.front()));
   }
   for (const std::string_view key : measures) add(find_rule(key));
+  mark_unchecked(table, group, rows);
   add_constant_parameters(table, group);
   return table;
 }

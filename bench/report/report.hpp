@@ -22,6 +22,7 @@ struct ReportOptions {
 
 /// Rows: by data set, encoding (registry order), build parameters, filter, storage,
 /// filtering, then settings; numbers by value. Records that are not `ok` keep their row.
+/// Rows whose picture was not checked are marked in a column `check`, whatever columns were chosen.
 /// `relative` is the wall time divided by that of the first `uniform` record of the same
 /// data set and render settings: of the same filter where there is one, else, for
 /// linear filters, of another linear one. Throws UsageError for an unknown column.
@@ -31,6 +32,9 @@ std::vector<Table> make_tables(std::span<const Json> records, const ReportOption
 /// `measures`. What is the same in all stands above the table. Throws UsageError for an unknown column.
 Table make_setting_table(std::string title, std::span<const Json* const> rows, std::span<const Json* const> all,
                          std::span<const std::string_view> measures);
+
+/// Why pictures of these records were not checked, and how many; null pointers are rows without a record. Nothing where all were.
+std::vector<std::string> unchecked_notes(std::span<const Json* const> records);
 
 /// Keys of all columns with a fixed name.
 std::vector<std::string_view> column_keys();

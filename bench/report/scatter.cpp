@@ -109,8 +109,8 @@ Json setting_key(const Json& record) {
   Json render = value_at(record, "/render");
   for (const char* key : {"view", "view_name"}) render.erase(key);
   Json key = Json::array();
-  for (const char* pointer : {"/experiment", "/context/renderer", "/dataset/name", "/dataset/hash", "/dataset/field", "/encoding",
-                              "/build_parameters", "/filter", "/storage", "/filtering"})
+  for (const char* pointer : {"/experiment", "/context/renderer", "/dataset/name", "/dataset/hash", "/dataset/exact_hash",
+                              "/dataset/field", "/encoding", "/build_parameters", "/filter", "/storage", "/filtering"})
     key.push_back(value_at(record, pointer));
   key.push_back(std::move(render));
   return key;
@@ -168,7 +168,7 @@ Table make_table(const Question& question, const std::vector<const Group*>& grou
   }
   Table table = make_setting_table(question.title, rows, all, {});
   table.constants.emplace(table.constants.begin(), "renderer", groups.front()->renderer);
-  table.notes = question.notes;
+  table.notes.insert(table.notes.begin(), question.notes.begin(), question.notes.end());
   table.columns.push_back({"against", "against", "", false});
   for (const char* which : {"least", "mean", "most"}) table.columns.push_back({which, fmt::format("{} a view", which), "", true});
   table.columns.push_back({"y_mean", fmt::format("{}, mean", question.quantity.label), "", true});

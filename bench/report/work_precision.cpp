@@ -125,7 +125,8 @@ std::vector<Scene> scenes_of(std::span<const Json> records, const Question& ques
   std::vector<Scene> scenes;
   for (const Json& record : records) {
     const Json key =
-        Json::array({value_at(record, "/context/renderer"), value_at(record, "/dataset/hash"), value_at(record, "/dataset/field"),
+        Json::array({value_at(record, "/context/renderer"), value_at(record, "/dataset/hash"),
+                     value_at(record, "/dataset/exact_hash"), value_at(record, "/dataset/field"),
                      scene_part(value_at(record, "/render")), question.common ? Json() : value_at(record, "/filter")});
     const auto [place, added] = places.try_emplace(key.dump(), scenes.size());
     if (added) scenes.push_back({scene_name(record) + (question.common ? "" : ", " + text_at(record, "/filter")), {}});

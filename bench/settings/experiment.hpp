@@ -22,6 +22,7 @@ struct DatasetSource {
   std::optional<std::filesystem::path> file;  ///< exists
   std::optional<std::string> field;           ///< absent = the first field
   Json generate;                              ///< null where a file is read
+  std::string written;                        ///< the file's path as the experiment has it
 };
 
 /// One structure to build.
@@ -66,8 +67,10 @@ struct Experiment {
   std::uint64_t seed = 1;                                            ///< of the order in which points are measured
   std::string context = "egl";                                       ///< egl, egl_device or osmesa
   std::optional<std::int64_t> memory_limit;                          ///< bytes of the textures and buffers of one build
-  std::optional<double> minimum_psnr_db;       ///< against a point's own reference; below it the point has failed
-  std::optional<std::array<Vec3d, 2>> region;  ///< scene files: sub-box to draw, world
+  std::optional<double> minimum_psnr_db;         ///< against a point's own reference; absent: the default (check_bound.hpp)
+  std::string check_why;                         ///< where minimum_psnr_db comes from, if the file says so
+  std::optional<std::string> unchecked_because;  ///< pictures are not checked, and why
+  std::optional<std::array<Vec3d, 2>> region;    ///< scene files: sub-box to draw, world
   /// The data set's first build, drawn with the first render settings, is timed before and
   /// after every point, so that times are ratios inside one run.
   bool baseline = false;

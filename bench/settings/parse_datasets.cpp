@@ -44,6 +44,7 @@ void parse_files(ExperimentParser& parser, const JsonNode& node) {
   for (const Choice& choice : parser.axes.combinations(node, depths_of(section_of("datasets").keys))) {
     DatasetSource source;
     source.file = existing_path(*find(choice, "file"), parser.file);
+    source.written = find(choice, "file")->text();
     if (const JsonNode* field = find(choice, "field"); field != nullptr && !field->json().is_null()) source.field = field->text();
     const JsonNode* name = find(choice, "name");
     source.name = name != nullptr ? name->text() : file_name(*source.file);

@@ -21,11 +21,22 @@ void parse_reference(ExperimentParser& parser) {
   read_settings(*node, members_of(*node), reference_settings(), *parser.experiment.reference);
 }
 
+/// A bound of one's own, or the reason for none.
+void require_check(const ExperimentParser& parser) {
+  const auto node = parser.root.find("check");
+  if (!node || node->json().is_null()) return;
+  const auto bound = node->find("psnr_db"), why = node->find("why"), off = node->find("off");
+  if (bound.has_value() == off.has_value())
+    node->fail("one of the keys 'psnr_db' (a bound of your own) and 'off' (why pictures are not checked) is needed");
+  if (off && why) why->fail("belongs to 'psnr_db'; accepted: the reason as the value of 'off'");
+  if (off && off->text().empty()) off->fail("accepted: the reason why pictures are not checked");
+}
+
 /// The checks that need a reference say which key asks for what is not there.
 void require_reference(const ExperimentParser& parser) {
   const Experiment& e = parser.experiment;
   const auto refuse = [&](const char* key, const char* why) { parser.root.require(key).fail(why); };
-  if (e.minimum_psnr_db && e.reference && !e.reference->own)
+  if ((e.minimum_psnr_db || e.unchecked_because) && e.reference && !e.reference->own)
     refuse("check", "pictures are checked against their own reference; accepted: null where 'reference' has 'own' false");
   if (!e.explain_error) return;
   if (!e.reference) refuse("explain_error", "a picture without a reference has no error to explain");
@@ -63,6 +74,7 @@ void parse_measuring(ExperimentParser& parser) {
     if (const auto node = parser.root.find(row.key.name)) read_setting(*node, row, e);
   if (!named) e.name = parser.file.path().stem().string();
   if (e.name.empty()) (named ? parser.root.require("name") : parser.root).fail("an empty name");
+  require_check(parser);
   require_reference(parser);
   for (RenderPoint& render : e.renders)
     if (render.settings.ray_offset) render.settings.ray_offset = static_cast<std::uint32_t>(e.seed ^ e.seed >> 32);

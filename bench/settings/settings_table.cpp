@@ -40,6 +40,34 @@ Setting<Experiment> flag(std::string name, std::string help) {
           [](Experiment& e, const Json& v) { e.*member = v.get<bool>(); }};
 }
 
+std::vector<Key> check_members() {
+  return {{.name = "psnr_db",
+           .type = number_type(0, kHighestPsnr),
+           .reference = AffectsReference::no,
+           .help = "the least that is accepted",
+           .unit = "dB"},
+          {.name = "why", .type = text_type(), .reference = AffectsReference::no, .help = "where `psnr_db` comes from"},
+          {.name = "off", .type = text_type(), .reference = AffectsReference::no, .help = "why pictures are not checked"}};
+}
+
+Json check_json(const Experiment& e) {
+  if (e.unchecked_because) return {{"off", *e.unchecked_because}};
+  if (!e.minimum_psnr_db) return nullptr;
+  Json check = {{"psnr_db", *e.minimum_psnr_db}};
+  if (!e.check_why.empty()) check["why"] = e.check_why;
+  return check;
+}
+
+void set_check(Experiment& e, const Json& v) {
+  e.minimum_psnr_db.reset();
+  e.unchecked_because.reset();
+  e.check_why.clear();
+  if (v.is_null()) return;
+  if (v.contains("psnr_db")) e.minimum_psnr_db = v["psnr_db"].get<double>();
+  if (v.contains("why")) e.check_why = v["why"].get<std::string>();
+  if (v.contains("off")) e.unchecked_because = v["off"].get<std::string>();
+}
+
 SettingTable<Experiment> make_experiment_settings() {
   std::vector<Setting<Experiment>> rows;
   rows.push_back({{.name = "name",
@@ -51,20 +79,13 @@ SettingTable<Experiment> make_experiment_settings() {
                   [](const Experiment& e) -> Json { return e.name; },
                   [](Experiment& e, const Json& v) { e.name = v.get<std::string>(); }});
   rows.push_back({{.name = "check",
-                   .type = object_type({{.name = "psnr_db",
-                                         .type = number_type(0, kHighestPsnr),
-                                         .reference = AffectsReference::no,
-                                         .unit = "dB",
-                                         .required = true}})
-                               .or_null(),
+                   .type = object_type(check_members()).or_null(),
                    .reference = AffectsReference::no,
-                   .help = "a picture below that against its own reference has failed and gets no time"},
-                  [](const Experiment& e) {
-                    return e.minimum_psnr_db ? Json{{"psnr_db", *e.minimum_psnr_db}} : Json();
-                  },
-                  [](Experiment& e, const Json& v) {
-                    e.minimum_psnr_db = v.is_null() ? std::nullopt : std::optional(v.at("psnr_db").get<double>());
-                  }});
+                   .help = "a picture that is worse against its own reference has failed and gets no time. `null`: the bound that its "
+                           "filter, storage, sampling, step and integrator let expect "
+                           "([bench/README.md](../bench/README.md#check)); a bound of your own; or `off`, with the reason",
+                   .default_text = "`null`: the default bound"},
+                  check_json, set_check});
   rows.push_back(flag<&Experiment::baseline>(
       "baseline", "time the data set's first build, with the first render settings, before and after every point"));
   rows.push_back(flag<&Experiment::explain_error>(
