@@ -93,7 +93,7 @@ TEST(ValueTypes, NameThePlaceAndWhatIsAccepted) {
 
 AmrHierarchy mesh() {
   return AmrHierarchy(
-      generate_mesh(Json::parse(R"({"field": "blobs_shell", "levels": 2, "root": 8, "patch": 4, "more_fields": ["linear"]})")));
+      generate_mesh(Json::parse(R"({"field": "linear", "levels": 2, "root": 8, "patch": 4, "more_fields": ["blobs_shell"]})")));
 }
 
 /// A picture small enough to be drawn many times.
@@ -105,7 +105,7 @@ Scene small_scene(Mode mode) {
   scene.transfer_function.color = {{0, {0, 0, 0.3}}, {1.4, {0.8, 0, 0}}};
   scene.settings.mode = mode;
   scene.settings.width = scene.settings.height = 8;
-  if (scene.settings.draws_surfaces()) scene.settings.isosurfaces.values = {1.1, 1.3};
+  if (scene.settings.draws_surfaces()) scene.settings.isosurfaces.values = {0.4, 0.6};
   return scene;
 }
 
@@ -131,10 +131,10 @@ const std::vector<Change>& changes() {
       {"skip", "false"},
       {"level_of_detail", "2"},
       {"max_level", "0"},
-      {"isovalues", "[1.15, 1.4]", Mode::iso},
+      {"isovalues", "[0.5, 0.7]", Mode::iso},
       {"iso_opacity", "[0.5, 0.7]", Mode::iso},
       {"surface_color", "[[0, 1, 1, 0]]", Mode::iso},
-      {"color_field", R"("linear")", Mode::iso},
+      {"color_field", R"("blobs_shell")", Mode::iso},
       {"iso_tolerance", "0.5", Mode::iso},
       {"shading", R"("none")", Mode::iso},
       {"output", R"("depth")", Mode::iso},
@@ -149,7 +149,7 @@ const std::vector<Change>& changes() {
       {"clip_planes", "[[1, 0, 0, 0.5]]"},
       {"mirror", R"("+x")"},
       {"triangles", R"([{"file": "x.obj"}])"},
-      {"transfer_functions", R"([{"field": "linear", "extinction": [[0, 3], [1, 9]], "color": [[0, 0, 1, 0]]}])"},
+      {"transfer_functions", R"([{"field": "blobs_shell", "extinction": [[0, 3], [1, 9]], "color": [[0, 0, 1, 0]]}])"},
       {"region", R"({"lower": [0, 0, 0], "upper": [0.5, 1, 1]})"}};
   return all;
 }
