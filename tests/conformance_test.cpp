@@ -162,7 +162,7 @@ TEST(Conformance, ManualFilteringOnGlIsTheReferenceAndTheCpusBits) {
 }
 
 TEST(Conformance, HardwareFilteringDiffersByTheTextureCoordinateAlone) {
-  // the normalised coordinate of a float costs 2^-14 of the local difference an axis (DESIGN 4); 2^-12 covers three and the
+  // the normalised coordinate of a float costs 2^-14 of the local difference an axis; 2^-12 covers three and the
   // weights' rounding
   for (const ContextKind kind : kContexts)
     for_each_case(

@@ -231,7 +231,7 @@ TEST(Stiff, LightIsExactAndMonotoneForTheExponentialRules) {
 }
 
 TEST(Stiff, ClampedEulerOfStiffLightIsNoPictureOfIt) {
-  // k h = 2.5: T = (1 - 2.5)^4 = 5.0625 (FACTS: k = 10, n = 4)
+  // k h = 2.5: T = (1 - 2.5)^4 = 5.0625 (k = 10, n = 4)
   const AmrHierarchy h = MeshBuilder(Vec3i(4)).root(constant(1)).hierarchy();
   const EncodedField field = build(h, a_case("uniform", Filter::nearest), {.storage = Storage::r64f});
   Scene scene = scene_of(Integrator::euler, orthographic(Vec3d(0.5), {1, 0, 0}, 0.5));

@@ -55,7 +55,7 @@ struct FieldStatistics {
 /// in part, ratios below 2, more than 31 bits of finest index.
 ///
 /// Values stored under finer patches are not used: on construction each refined
-/// cell that a patch stores receives the level value of DESIGN "filters", the
+/// cell that a patch stores receives its level value v_L (docs/filters.md), the
 /// volume-weighted mean of its leaf descendants that have a value.
 class AmrHierarchy {
  public:
@@ -97,7 +97,7 @@ class AmrHierarchy {
   std::optional<LeafCell> find_leaf(const Vec3i& finest_cell) const;
   double value(const LeafCell& leaf, int field) const;
 
-  /// v_L of one cell (DESIGN "filters"); NaN where the mesh or the value is missing.
+  /// v_L of one cell (docs/filters.md); NaN where the mesh or the value is missing.
   double level_value(int level, const Vec3i& cell, int field) const;
 
   std::int64_t leaf_cells() const;
