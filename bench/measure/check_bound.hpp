@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/measure/image_error.hpp"
+#include "bench/numbers/image_error.hpp"
 #include "bench/settings/experiment.hpp"
 
 namespace amrtex {
