@@ -250,7 +250,7 @@ std::vector<EncodingCase> cases_of_bytes() {
   for (const EncodingCase& base : encoding_cases()) {
     if (!base.parameters.empty()) continue;
     for (const ParameterInfo& p : base.encoding->parameters())
-      for (const Json& value : p.accepted.examples()) {
+      for (const Json& value : declared_values(p)) {
         EncodingCase c = base;
         c.parameters[p.name] = value;
         if (accepted(c, {.storage = Storage::r8})) cases.push_back(std::move(c));

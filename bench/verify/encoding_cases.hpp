@@ -104,12 +104,19 @@ inline std::vector<Filtering> EncodingCase::filterings() const {
   return all;
 }
 
+/// Names and numbers among what a parameter tells that it takes. What is switched on or off makes no case of its own.
+inline std::vector<Json> declared_values(const ParameterInfo& p) {
+  std::vector<Json> values = p.accepted.examples();
+  std::erase_if(values, [](const Json& value) { return !value.is_string() && !value.is_number(); });
+  return values;
+}
+
 /// The defaults where they take the filter, else the first declared value of a parameter that does.
 inline EncodingCase default_case(const Encoding& encoding, Filter filter, const ContextInfo& limits = {}) {
   EncodingCase c{&encoding, filter, Json::object(), limits};
   if (accepted(c)) return c;
   for (const ParameterInfo& p : encoding.parameters())
-    for (const Json& value : p.accepted.examples()) {
+    for (const Json& value : declared_values(p)) {
       const EncodingCase other{&encoding, filter, Json{{p.name, value}}, limits};
       if (accepted(other)) return other;
     }
@@ -130,7 +137,7 @@ inline std::string content_of(const EncodingCase& c) {
   return content;
 }
 
-/// The default case, and with it every choice of each parameter, of numbers the first two, where they change
+/// The default case, and with it every name and the first two numbers of each parameter, where they change
 /// anything.
 inline std::vector<EncodingCase> variants(const Encoding& encoding, Filter filter, const ContextInfo& limits = {}) {
   const EncodingCase base = default_case(encoding, filter, limits);
@@ -138,7 +145,7 @@ inline std::vector<EncodingCase> variants(const Encoding& encoding, Filter filte
   std::set<std::string> contents{content_of(base)};
   for (const ParameterInfo& p : encoding.parameters()) {
     int numbers = 0;
-    for (const Json& value : p.accepted.examples()) {
+    for (const Json& value : declared_values(p)) {
       if (value.is_number() && ++numbers > 2) continue;
       EncodingCase c = base;
       c.parameters[p.name] = value;
