@@ -40,13 +40,13 @@ void for_each_filter(F&& f) {
 }
 
 /// One case of each encoding with one of its filters, in another test another one: for what knows no filter, drawn on GL. In the
-/// full tier as for_each_filter.
+/// full tier, and of a slice, as for_each_filter.
 template <class F>
 void for_each_chosen(F&& f) {
   for_each_filter([&](const EncodingCase& c) {
     const std::span<const Filter> filters = c.encoding->filters();
     const auto number = static_cast<std::size_t>(std::find(filters.begin(), filters.end(), c.filter) - filters.begin());
-    if (chosen(turn_of_test(), number, filters.size())) f(c);
+    if (!case_slice().empty() || chosen(turn_of_test(), number, filters.size())) f(c);
   });
 }
 
