@@ -10,7 +10,7 @@ layout(local_size_x = 64) in;
 layout(std430) readonly buffer probe_cells_block { ivec4 probe_cells[]; };
 layout(std430) readonly buffer probe_fractions_block { vec4 probe_fractions[]; };
 layout(std430) writeonly buffer probe_values_block { vec4 probe_values[]; };
-UNIFORM(int, u_probe_count)
+uniform int u_probe_count;
 
 void main() {
   int i = int(gl_GlobalInvocationID.x);

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "structures/generators/random_mesh.hpp"
-#include "tests/encoding_cases.hpp"
+#include "tests/pictures.hpp"
 
 namespace amrtex {
 namespace {
@@ -109,6 +109,7 @@ TEST(Differential, GlIsTheReferenceAndTheCpusBitsOnRandomMeshes) {
       const AmrHierarchy h(random_mesh(100 + seed, small_meshes()));
       const auto positions = probe_positions(h, 16, seed);
       for (const EncodingCase& c : encoding_cases()) {
+        if (!chosen(seed, number_of(c), 3)) continue;
         const auto filterings = c.filterings();
         const Filtering filtering = filterings[seed % filterings.size()];
         SCOPED_TRACE(fmt::format("{} seed {}: {} {}", context_kind_name(kind), 100 + seed, c.name(), filtering_name(filtering)));

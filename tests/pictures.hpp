@@ -3,8 +3,16 @@
 
 #include "bench/verify/pictures.hpp"
 #include "tests/encoding_cases.hpp"
+#include "tests/test_tier.hpp"
 
 namespace amrtex::test {
+
+/// A case's place among all, for chosen().
+inline std::size_t number_of(const EncodingCase& c) {
+  const auto& cases = encoding_cases();
+  const auto same = [&](const EncodingCase& other) { return other.name() == c.name(); };
+  return static_cast<std::size_t>(std::find_if(cases.begin(), cases.end(), same) - cases.begin());
+}
 
 template <class F>
 void for_each_case(F&& f) {
@@ -29,6 +37,17 @@ void for_each_last(Same&& same, F&& f) {
 template <class F>
 void for_each_filter(F&& f) {
   for_each_last([](const EncodingCase& a, const EncodingCase& b) { return a.encoding == b.encoding && a.filter == b.filter; }, f);
+}
+
+/// One case of each encoding with one of its filters, in another test another one: for what knows no filter, drawn on GL. In the
+/// full tier, and of a slice, as for_each_filter.
+template <class F>
+void for_each_chosen(F&& f) {
+  for_each_filter([&](const EncodingCase& c) {
+    const std::span<const Filter> filters = c.encoding->filters();
+    const auto number = static_cast<std::size_t>(std::find(filters.begin(), filters.end(), c.filter) - filters.begin());
+    if (!case_slice().empty() || chosen(turn_of_test(), number, filters.size())) f(c);
+  });
 }
 
 /// One case of each encoding: for the dearest shaders, where the CPU builds of the same text are asked with every filter.
