@@ -380,7 +380,7 @@ TEST(ExperimentErrors, NameKeyAndWhatIsAccepted) {
       {"datasets", "[]", "datasets:", "empty list"},
       {"datasets", "[{}]", "datasets[0]:", "'file' and 'generate'"},
       {"datasets", R"([{"file": "x", "generate": {}}])", "datasets[0]:", "'file' and 'generate'"},
-      {"datasets", R"([{"file": "no such file"}])", "datasets[0].file:", "no such file or folder"},
+      {"datasets", R"([{"file": "no such file"}])", "datasets[0].file:", "no such file or directory"},
       {"datasets", R"([{"generate": {}, "field": "x"}])", "datasets[0].field:", "generate"},
       {"datasets", R"(["x"])", "datasets[0]:", "an object"},
       {"datasets", R"([{"files": "x"}])", "datasets[0].files:", "did you mean 'file'?"},

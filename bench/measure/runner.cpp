@@ -143,7 +143,8 @@ class Runner {
   /// Of what is drawn; a mesh is hashed once for each choice of fields and triangles.
   const std::string& data_hash(const RenderPoint& render) {
     const Scene scene = scene_of(experiment_, render);
-    std::string key = triangles_json(scene.settings.triangles).dump();
+    std::string key;
+    for (const TriangleObject& object : scene.settings.triangles) key += object.mesh->content_hash() + " ";
     for (const int field : more_fields(*mesh_, scene)) key += fmt::format(" {}", field);
     std::string& hash = data_hashes_[key];
     if (hash.empty()) hash = exact_data_hash(*mesh_, scene);

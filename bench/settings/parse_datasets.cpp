@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "bench/settings/experiment_parser.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 namespace {
@@ -73,9 +74,10 @@ std::filesystem::path existing_path(const JsonNode& node, const JsonFile& file) 
   std::error_code ignored;
   if (!given.empty() && std::filesystem::exists(beside, ignored)) return beside;
   if (!given.empty() && std::filesystem::exists(given, ignored)) return given;
-  node.fail(given.is_absolute() ? fmt::format("no such file or folder: {}", given.string())
-                                : fmt::format("no such file or folder: neither {} nor {}", beside.string(),
-                                              (std::filesystem::current_path(ignored) / given).string()));
+  if (given.empty()) node.fail("an empty path; accepted: a file or a folder");
+  if (given.is_absolute()) node.fail(fmt::format("{}: {}", clipped(given.string()), why_absent(given)));
+  const auto here = std::filesystem::current_path(ignored) / given;
+  node.fail(fmt::format("{}: {}; {}: {}", beside.string(), why_absent(beside), here.string(), why_absent(here)));
 }
 
 }  // namespace amrtex

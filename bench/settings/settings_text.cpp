@@ -119,7 +119,7 @@ std::string parameters_markdown() {
   std::string text = "| encoding | parameter | default | accepted | meaning |\n|---|---|---|---|---|\n";
   for (const Encoding* e : all_encodings())
     for (const ParameterInfo& p : e->parameters())
-      text += fmt::format("| `{}` | `{}` | {} | {} | {} |\n", e->name(), p.name, code(p.default_value), cell(p.accepted),
+      text += fmt::format("| `{}` | `{}` | {} | {} | {} |\n", e->name(), p.name, code(p.default_value), cell(p.accepted.text()),
                           cell(p.description));
   return text;
 }
