@@ -4,7 +4,7 @@ set(text "// Made by cmake/EmbedShaders.cmake.\n#include \"shaders/shader_librar
 string(APPEND text "std::span<const ShaderFile> shader_files() {\n  static constexpr ShaderFile files[] = {\n")
 foreach(file IN LISTS FILES)
   file(RELATIVE_PATH path ${ROOT} ${file})
-  string(REGEX REPLACE "^[^/]+/" "" path ${path})
+  string(REGEX REPLACE "^[^/]+/(.*)$" "\\1" path ${path})
   file(READ ${file} contents)
   # string literals of at most 64 KiB are portable; ours are far below
   string(APPEND text "    {\"${path}\", R\"glsl_text(${contents})glsl_text\"},\n")
