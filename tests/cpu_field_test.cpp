@@ -4,7 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "renderers/consumers/consumer.hpp"
+#include "renderers/bindings/scene_bindings.hpp"
+#include "renderers/bindings/scene_needs.hpp"
 #include "renderers/consumers/probe.hpp"
 #include "tests/pictures.hpp"
 

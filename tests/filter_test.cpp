@@ -48,8 +48,8 @@ TEST(Filters, AreFoundByTheirNames) {
   }
 }
 
-TEST(Filters, AreDefinedInTheShadersReadme) {
-  std::ifstream file(std::string(AMRTEX_SOURCE_DIR) + "/shaders/README.md");
+TEST(Filters, AreDefinedInTheDocumentation) {
+  std::ifstream file(fmt::format("{}/docs/filters.md", AMRTEX_SOURCE_DIR));
   std::stringstream text;
   text << file.rdbuf();
   for (const FilterInfo& info : kFilterTable) EXPECT_THAT(text.str(), HasSubstr(fmt::format("| `{}` |", info.name)));

@@ -379,8 +379,10 @@ TEST(Prune, IsRefusedByEncodingsThatHaveNoPartsAndByOtherModes) {
       ADD_FAILURE() << encoding->name();
     } catch (const UnsupportedError& e) {
       EXPECT_THAT(e.what(), HasSubstr(std::string(encoding->name())));
-      for (const Encoding* other : all_encodings())
-        if (other->prunes()) EXPECT_THAT(e.what(), HasSubstr(std::string(other->name())));
+      for (const Encoding* other : all_encodings()) {
+        if (!other->prunes()) continue;
+        EXPECT_THAT(e.what(), HasSubstr(std::string(other->name())));
+      }
     }
   }
   for (const Mode mode : {Mode::projection, Mode::mip, Mode::iso, Mode::dvr_iso}) {

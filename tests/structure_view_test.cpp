@@ -37,7 +37,7 @@ EncodedField built(const AmrHierarchy& mesh, const std::string& encoding, Filter
 TEST(StructureView, RegionsOfEveryEncodingAndFilterDivideTheDomain) {
   const AmrHierarchy mesh = small_mesh();
   const Box domain = mesh.domain(mesh.finest_level());
-  for (const verify::EncodingCase& c : verify::make_encoding_cases({}, "")) {
+  for (const verify::EncodingCase& c : verify::make_encoding_cases({})) {
     SCOPED_TRACE(c.name());
     if (!verify::accepted(mesh, c)) continue;
     std::vector<int> covered(static_cast<std::size_t>(domain.cells()));
