@@ -1,12 +1,7 @@
 // The integrator that chooses its intervals, so that a channel of a pixel is off by no more than what was asked.
 // An interval is the two pre-integrated halves between three samples. How far the middle one is off the line between the
 // ends says what the halves are still off (a parabola through the three), and corrects them.
-#if !AMRTEX_CPP
-#ifndef AMRTEX_CONTINUOUS
-#error AMRTEX_CONTINUOUS must be defined: 1 where the filter is continuous everywhere, else 0
-#endif
-#endif
-DEFINE_INT(AMRTEX_CONTINUOUS)
+DEFINE_INT(AMRTEX_CONTINUOUS)  // 1 where the filter is continuous everywhere, else 0
 UNIFORM(real, u_interval_error)  // that one interval may have
 UNIFORM(real, u_longest)         // interval, in cell widths of the region
 

@@ -67,7 +67,15 @@ std::string row_of(const Table& table, std::string folder) {
   return "";
 }
 
-bool is_test(const std::string& file) { return file.starts_with("tests/") || file.ends_with("_test.cpp"); }
+bool is_test(const std::string& file) {
+  return file.starts_with("tests/") || file.ends_with("_test.cpp") || file.ends_with("_test_tools.hpp");
+}
+
+/// CMake fills in an encoding's folder.
+std::string filled_in(std::string path) {
+  const std::string folder = "@folder@/";
+  return path.starts_with(folder) ? "structures/<encoding>/" + path.substr(folder.size()) : path;
+}
 
 bool allows(const std::set<std::string>& allowed, const std::string& row) {
   for (const std::string& entry : allowed)
@@ -95,7 +103,8 @@ std::vector<Include> includes_of(const fs::path& path) {
   std::vector<Include> includes;
   for (std::string line; std::getline(file, line);)
     if (line.starts_with(start))
-      includes.push_back({fs::relative(path, kRoot), line.substr(start.size(), line.find('"', start.size()) - start.size())});
+      includes.push_back(
+          {fs::relative(path, kRoot), filled_in(line.substr(start.size(), line.find('"', start.size()) - start.size()))});
   return includes;
 }
 

@@ -204,15 +204,19 @@ std::string why_none(const AdviceRequest& request, const Advice& advice) {
   return "no structure could be measured";
 }
 
+void check_scene_name(const std::string& scene) {
+  if (fs::path(scene).extension() != ".json")
+    throw UsageError(fmt::format("--scene {}: accepted: a name ending in .json", clipped(scene)));
+  if (const std::string reason = why_absent(fs::absolute(scene).parent_path()); !reason.empty())
+    throw UsageError(
+        fmt::format("--scene {}: its folder: {}; accepted: a file in a folder that is there", clipped(scene), reason));
+}
+
 int run(const Arguments& a) {
   const AdviceRequest request = request_of(a);
   RunOptions options;
   options.context = parse_context_kind(a.context);
-  if (!a.scene.empty() && fs::path(a.scene).extension() != ".json")
-    throw UsageError(fmt::format("--scene {}: accepted: a name ending in .json", a.scene));
-  const fs::path folder_of_scene = fs::absolute(a.scene).parent_path();
-  if (const std::string reason = why_absent(folder_of_scene); !a.scene.empty() && !reason.empty())
-    throw UsageError(fmt::format("--scene {}: its folder: {}; accepted: a file in a folder that is there", a.scene, reason));
+  if (!a.scene.empty()) check_scene_name(a.scene);
   const AmrHierarchy mesh = read_data(a);
   const Json scene = scene_json(a, mesh);
   const Experiment experiment = parse_experiment(scene.dump(1), "advise");
