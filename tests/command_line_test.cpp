@@ -812,7 +812,7 @@ TEST_F(CommandLine, AdviseRefusesBadUsageBeforeAnyWork) {
                                                    {{"--field", "rho"}, "rho", "phi"},
                                                    {{"--storage", "r64"}, "r64", "r32f"},
                                                    {{"--context", "vulkan"}, "vulkan", "osmesa"},
-                                                   {{"--view", "{\"eye\": 3}"}, "views", "'at'"},
+                                                   {{"--view", "{\"eye\": 3}"}, "views", "'eye'"},
                                                    {{"--transfer-function", "none.json"}, "none.json", "accepted"},
                                                    {{"--scene", "a.txt"}, "a.txt", ".json"},
                                                    {{"--scene", "no_folder/a.json"}, "no_folder", "folder"}})

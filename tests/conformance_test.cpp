@@ -720,7 +720,7 @@ TEST(MutationControl, AWrongLevelsWidthIsNoticed) {
         if (u.name == "u_level_width") {
           auto& widths = std::get<std::vector<int>>(u.numbers);
           widths[static_cast<std::size_t>(used)] *= 2;
-          widths.push_back(0);  // of the level that the define below adds
+          widths.push_back(1 << 20);  // of the level that the define below adds: of no cell
         }
       ShaderKey key = probe_key(field, 0);  // where all ratios are 2 widths follow from the number of levels
       key.defines["AMRTEX_LEVELS"] = std::to_string(h.level_count() + 1);

@@ -307,8 +307,8 @@ TEST(Slices, OneByOneTakeAPixelOnceWhereBoxesOverlap) {
   const AmrHierarchy h = nested(waves).hierarchy();
   for (const ConsumerKind consumer : {ConsumerKind::slices, ConsumerKind::stencil_slices}) {
     const Scene scene = cloud_scene(views()[0].view, consumer, Sampling::adaptive);
-    EncodedField field = build(h, kd_case(Filter::linear_lod), {.draw_boxes = true});
-    const Structure structure(gl, field);
+    Structure structure(gl, build(h, kd_case(Filter::linear_lod), {.draw_boxes = true}));
+    EncodedField& field = structure.field;
     const auto drawn = [&] {
       const auto c = make_consumer(gl, h, structure, scene);
       c->draw();

@@ -16,6 +16,10 @@
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {
+
+/// In lists of tests.
+static void PrintTo(ContextKind kind, std::ostream* out) { *out << context_kind_name(kind); }
+
 namespace {
 
 using namespace std::chrono_literals;
