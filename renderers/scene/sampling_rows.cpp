@@ -1,6 +1,7 @@
 // Keys of `render` that say how a picture is drawn.
 #include "renderers/scene/scene_names.hpp"
 #include "renderers/scene/scene_rows.hpp"
+#include "renderers/scene/scene_settings.hpp"
 
 namespace amrtex::scene_rows {
 namespace {

@@ -6,7 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "renderers/scene/scene_settings.hpp"
+#include "renderers/scene/scene.hpp"
+#include "renderers/scene/setting.hpp"
 
 namespace amrtex::scene_rows {
 

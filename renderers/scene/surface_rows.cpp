@@ -5,6 +5,7 @@
 
 #include "renderers/scene/scene_names.hpp"
 #include "renderers/scene/scene_rows.hpp"
+#include "renderers/scene/scene_settings.hpp"
 
 namespace amrtex::scene_rows {
 namespace {

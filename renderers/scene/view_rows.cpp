@@ -1,5 +1,6 @@
 // Keys of a view and of a transfer function.
 #include "renderers/scene/scene_rows.hpp"
+#include "renderers/scene/scene_settings.hpp"
 
 namespace amrtex::scene_rows {
 
