@@ -46,7 +46,7 @@ class Installed(unittest.TestCase):
                      "experiments/README.md", "experiments/quickstart/experiment.json", "experiments/limits/scene.json",
                      "experiments/quickstart/results/table.md"):
             self.assertTrue((self.share / name).is_file(), name)
-        self.assertEqual(list(self.share.rglob("records")), [])
+        self.assertEqual(list((self.share / "experiments").rglob("records")), [])
 
 
 if __name__ == "__main__":
