@@ -44,6 +44,9 @@ std::vector<EncodingCase> all_cases() {
   return list;
 }
 
+/// Pixels: no cell is as small, and the square of it is 0 in floats.
+constexpr double kNoThreshold = 1e-30;
+
 Scene scene_of(const AmrHierarchy& h, std::optional<double> threshold, std::optional<int> max_level = std::nullopt) {
   const Vec3d middle = (h.domain_lower() + h.domain_upper()) * 0.5;
   Scene scene;
@@ -113,7 +116,7 @@ TEST(LevelOfDetail, AThresholdOfNothingGivesTheBitsOfTheStructureWithoutIt) {
       const auto positions = probe_positions(h, 6);
       const auto expected = probe_on_cpu(h, build(h, c), Precision::single_precision, positions);
       const EncodedField field = build(h, c, {.level_of_detail = true});
-      for (const double threshold : {0.0, 1e-12}) {
+      for (const double threshold : {kNoThreshold, 1e-12}) {
         const Comparison same = compare(positions, values_of(expected),
                                         probe(h, field, scene_of(h, threshold), positions, Precision::single_precision), 0.0);
         EXPECT_TRUE(same) << same;
@@ -422,7 +425,7 @@ TEST(LevelOfDetail, TheContextDrawsWhatTheTextComputesWithFewerSamples) {
     // nearest takes on either side
     const double bound = c.filter == Filter::nearest ? 3e-3 : 1e-4;
     EXPECT_LT(rms(picture, render_on_cpu(h, field, pruned, false)), bound);
-    const Picture whole = draw(gl, h, field, scene_of(h, 0.0), &fine);
+    const Picture whole = draw(gl, h, field, scene_of(h, kNoThreshold), &fine);
     EXPECT_LT(coarse.samples, fine.samples);
     EXPECT_EQ(whole.values, draw(gl, h, build(h, c), scene_of(h, std::nullopt)).values) << "off and a threshold of nothing";
   }
