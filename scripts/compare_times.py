@@ -21,7 +21,8 @@ import experiment_runs
 ENCODINGS = [
     {"name": "uniform", "filters": "linear_page"},
     {"name": "page_table", "page_size": 16, "filters": "linear_page"},
-    {"name": "octree", "filters": ["nearest", "linear_lod"], "filtering": "manual"},
+    {"name": "octree", "filters": "nearest", "filtering": "manual"},
+    {"name": "octree", "filters": "linear_lod", "filtering": "manual"},
     {"name": "kd_tree", "filters": "linear_lod"},
     {"name": "exabricks", "filters": "basis"},
 ]
