@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Installs what is missing, builds, and runs the tests: a sample of everything, in minutes.
 #   scripts/test.sh           what each change must pass
-#   scripts/test.sh --full    every combination, then the sanitizers, the compilers of Debian 13 in a bare root, and
-#                             both commands of the README in a clone; an optional package that is missing is a failure
+#   scripts/test.sh --full    every combination, then the sanitizers, the compilers of Debian 13 in a bare root, both
+#                             commands of the README in a clone, and planted faults; a missing optional package is a failure
 #   scripts/test.sh -- ARGS   ARGS go to ctest: `scripts/test.sh -- -L reference`
 # AMRTEX_PRESET names the configure preset: `release`, or `ci`, where warnings are errors.
 set -euo pipefail
@@ -39,4 +39,5 @@ if [ $full = yes ]; then
   scripts/check_sanitizers.sh
   scripts/check_commands.sh
   scripts/check_compilers.sh
+  scripts/check_mutations.py
 fi
