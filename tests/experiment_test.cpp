@@ -9,7 +9,7 @@
 #include <fstream>
 #include <set>
 
-#include "bench/measure/runner.hpp"
+#include "bench/measure/scene_data.hpp"
 #include "bench/records/record.hpp"
 #include "bench/settings/json_file.hpp"
 #include "renderers/scene/triangle_mesh.hpp"

@@ -9,6 +9,7 @@
 
 #include "bench/measure/environment.hpp"
 #include "bench/measure/runner.hpp"
+#include "bench/measure/scene_data.hpp"
 #include "bench/measure/shader_cache.hpp"
 #include "bench/records/record.hpp"
 #include "renderers/scene/triangle_mesh.hpp"

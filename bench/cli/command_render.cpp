@@ -2,13 +2,13 @@
 
 #include "bench/cli/commands.hpp"
 #include "bench/measure/error_split.hpp"
-#include "bench/measure/runner.hpp"
+#include "bench/measure/scene_data.hpp"
 #include "bench/settings/experiment.hpp"
 #include "renderers/bindings/scene_needs.hpp"
 #include "renderers/consumers/make_consumer.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
-#include "structures/mesh/quoted.hpp"
 #include "renderers/scene/scene_settings.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 namespace {

@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "bench/measure/scene_data.hpp"
 #include "bench/numbers/pareto.hpp"
 #include "bench/records/record.hpp"
 #include "structures/mesh/error.hpp"

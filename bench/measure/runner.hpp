@@ -1,16 +1,14 @@
 // Running experiments: build, upload, draw, check, time, record.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 
 #include "bench/settings/experiment.hpp"
-#include "renderers/consumers/consumer.hpp"
 #include "renderers/context/context.hpp"
-#include "structures/generators/synthetic.hpp"
 
 namespace amrtex {
 
@@ -38,30 +36,5 @@ struct RunSummary {
 /// Measures every point that has no record of this implementation yet. Points that fail or cannot be done
 /// become records too; throws only for what concerns the whole experiment, as a folder that holds records of schema 1.
 RunSummary run_experiment(const Experiment& experiment, const RunOptions& options);
-
-/// The mesh of one data set of an experiment, with the field that is wanted first, and after it
-/// those that some render point colours surfaces by.
-AmrHierarchy load_dataset(const Experiment& experiment, const DatasetSource& source);
-
-/// The field that a generated data set samples; null for a file.
-std::unique_ptr<AnalyticField> analytic_field(const DatasetSource& source);
-
-/// Fields beside the drawn one that the scene fetches. Throws UsageError naming the fields there are.
-std::vector<int> more_fields(const AmrHierarchy& hierarchy, const Scene& scene);
-
-/// Hex digits that tell apart what a scene of this mesh is made of: every field in use to the bit, the mesh with its place and
-/// spacing, and the corners of triangles, whatever their files are called.
-std::string exact_data_hash(const AmrHierarchy& hierarchy, const Scene& scene);
-
-/// What is legal about a scene of field 0 of this mesh, and yet likely not meant.
-std::vector<std::string> scene_warnings(const AmrHierarchy& hierarchy, const Scene& scene);
-
-/// The picture of the scene by the double reference of `definition`, from the cache
-/// below `folder` where it was drawn before. `hash` receives the name of that file.
-Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definition, const Scene& scene, double step,
-                         const std::filesystem::path& folder, std::string& hash);
-
-/// Frame times through Google Benchmark with manual time: `warm_up` frames are dropped.
-std::vector<FrameTime> time_frames(Consumer& consumer, int warm_up, int frames);
 
 }  // namespace amrtex

@@ -1,6 +1,6 @@
-#include <benchmark/benchmark.h>
+#include "bench/measure/timing.hpp"
 
-#include "bench/measure/runner.hpp"
+#include <benchmark/benchmark.h>
 
 namespace amrtex {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <optional>
 
-#include "bench/measure/runner.hpp"
+#include "bench/measure/scene_data.hpp"
 #include "renderers/bindings/scene_needs.hpp"
 #include "renderers/consumers/raycaster.hpp"
 #include "renderers/gpu/draw_target.hpp"

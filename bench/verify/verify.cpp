@@ -9,6 +9,8 @@
 #include <cmath>
 #include <map>
 
+#include "structures/mesh/quoted.hpp"
+
 namespace amrtex::verify {
 namespace {
 
@@ -115,7 +117,12 @@ void VerifyContext::tell(const std::string& name) const {
 
 void VerifyContext::for_each(const std::string& name, std::span<const EncodingCase> cases, const Body& body) {
   tell(name);
+  std::size_t turn = asked_++;
   for (const EncodingCase& c : cases) try {
+      if (turn++ % options_.one_in != 0) {
+        skip(name, &c, fmt::format("one in {} is asked", options_.one_in));
+        continue;
+      }
       const Verdict verdict = options_.list ? NotAsked{"listed"} : body(c);
       if (const Check* check = std::get_if<Check>(&verdict))
         add(name, &c, *check);
@@ -148,7 +155,7 @@ const Suite& find_suite(std::string_view name) {
     if (s.name == name) return s;
     names.push_back(s.name);
   }
-  throw UsageError(fmt::format("no suite '{}'; accepted: {}", name, fmt::join(names, ", ")));
+  throw UsageError(fmt::format("no suite {}; accepted: {}", quote(name), fmt::join(names, ", ")));
 }
 
 Json to_json(const Report& report) {

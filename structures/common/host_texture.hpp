@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "structures/mesh/checked.hpp"
 #include "structures/mesh/spaces.hpp"
 
 namespace amrtex {
@@ -54,8 +55,8 @@ struct HostTexture {
   MemoryByRole roles;           ///< sums to bytes()
   std::vector<std::byte> data;  ///< x fastest
 
-  std::int64_t texels() const { return std::int64_t{size.x} * size.y * size.z; }
-  std::int64_t bytes() const { return texels() * texel_bytes(format); }
+  std::int64_t texels() const { return (CheckedSize(size.x) * size.y * size.z).or_most(); }
+  std::int64_t bytes() const { return (CheckedSize(texels()) * texel_bytes(format)).or_most(); }
   template <class T>
   T* as() {
     return reinterpret_cast<T*>(data.data());

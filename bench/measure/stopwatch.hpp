@@ -1,0 +1,17 @@
+// Time that has passed, by a clock that never goes back.
+#pragma once
+
+#include <chrono>
+
+namespace amrtex {
+
+/// Runs from its construction on.
+class Stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace amrtex
