@@ -16,9 +16,9 @@
 #include <system_error>
 #include <utility>
 
-#include "bench/records/files.hpp"
 #include "bench/records/record.hpp"
 #include "structures/mesh/quoted.hpp"
+#include "structures/mesh/whole_file.hpp"
 
 namespace amrtex {
 namespace {
@@ -160,14 +160,14 @@ RecordLines load_record_lines(const fs::path& folder) {
 RecordFile::RecordFile(const fs::path& folder) : folder_(folder), path_(folder / kFile) {
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) throw FolderError(fmt::format("output folder {}: {}", folder.string(), error.message()));
+  if (error) throw OutputError(fmt::format("output folder {}: {}", folder.string(), error.message()));
   if (const auto old = separate_record(folder))
     throw UsageError(fmt::format(
         "output folder {}: {} is of an older form, which a run does not go on from; accepted: another folder for --out, or this one "
         "without its folder `records` (`amrtex report` still makes tables of them)",
         folder.string(), (fs::path("records") / old->filename()).string()));
   descriptor_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-  if (descriptor_ < 0) throw FolderError(fmt::format("{}: cannot be written: {}", path_.string(), reason()));
+  if (descriptor_ < 0) throw OutputError(fmt::format("{}: cannot be written: {}", path_.string(), reason()));
   try {
     lock();
     take_over(parse_record_lines(read_text(path_), path_.string()));
@@ -194,7 +194,7 @@ void RecordFile::lock() {
 void RecordFile::take_over(const RecordLines& lines) {
   warnings_.insert(warnings_.end(), lines.warnings.begin(), lines.warnings.end());
   if (lines.torn && ::ftruncate(descriptor_, static_cast<off_t>(lines.whole_bytes)) != 0)
-    throw FolderError(fmt::format("{}: its torn last line cannot be cut off: {}", path_.string(), reason()));
+    throw OutputError(fmt::format("{}: its torn last line cannot be cut off: {}", path_.string(), reason()));
   for (const Json& record : lines.records) {
     order_.push_back(key_of(record));
     last_[order_.back()] = record;
@@ -218,12 +218,12 @@ void RecordFile::append(const Json& record) {
   struct stat open_file {}, named{};
   if (::fstat(descriptor_, &open_file) != 0 || ::stat(path_.c_str(), &named) != 0 || open_file.st_ino != named.st_ino ||
       open_file.st_dev != named.st_dev)
-    throw FolderError(fmt::format("{}: is gone, or another file has its name", path_.string()));
+    throw OutputError(fmt::format("{}: is gone, or another file has its name", path_.string()));
   const std::string line = record_line(record) + "\n";
   if (const int error = write_all(descriptor_, line); error != 0) {
     // half a line must not stay; where even this fails, the next run cuts it off
     static_cast<void>(::ftruncate(descriptor_, open_file.st_size));
-    throw FolderError(fmt::format("{}: cannot be written: {}", path_.string(), std::system_category().message(error)));
+    throw OutputError(fmt::format("{}: cannot be written: {}", path_.string(), std::system_category().message(error)));
   }
   const RecordKey key = key_of(record);
   if (last_.insert_or_assign(key, record).second) order_.push_back(key);

@@ -9,16 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "structures/mesh/error.hpp"
 #include "structures/mesh/json.hpp"
 
 namespace amrtex {
-
-/// What is wrong with a folder of results, and with no point of it: full, read-only, gone. It ends a run.
-class FolderError : public Error {
- public:
-  using Error::Error;
-};
 
 /// What tells lines apart.
 struct RecordKey {
@@ -53,7 +46,7 @@ RecordLines load_record_lines(const std::filesystem::path& folder);
 class RecordFile {
  public:
   /// Makes folder and file where they are not there. A part of a line at the end is cut off, with a warning. Throws UsageError where another
-  /// run holds the file or the folder holds files of an older form, FolderError where it cannot be written.
+  /// run holds the file or the folder holds files of an older form, OutputError where it cannot be written.
   explicit RecordFile(const std::filesystem::path& folder);
   ~RecordFile();
   RecordFile(const RecordFile&) = delete;
@@ -65,7 +58,7 @@ class RecordFile {
   /// The last record of each key.
   std::vector<Json> records() const;
 
-  /// Validates and adds a line, which is on disk when this returns; or takes back what it wrote, and throws FolderError.
+  /// Validates and adds a line, which is on disk when this returns; or takes back what it wrote, and throws OutputError.
   void append(const Json& record);
 
  private:

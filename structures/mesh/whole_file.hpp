@@ -4,12 +4,20 @@
 #include <filesystem>
 #include <string_view>
 
+#include "structures/mesh/error.hpp"
+
 namespace amrtex {
+
+/// What is wrong with the place that something is written to: full, read-only, gone.
+class OutputError : public Error {
+ public:
+  using Error::Error;
+};
 
 /// Writes all bytes and waits until they are on disk; 0, or the error number.
 int write_all(int descriptor, std::string_view bytes);
 
-/// Writes under a random name beside `target` that no other process can have, fsync, rename; what was there is replaced. Throws FolderError
+/// Writes under a random name beside `target` that no other process can have, fsync, rename; what was there is replaced. Throws OutputError
 /// naming the file.
 void write_atomically(const std::filesystem::path& target, std::string_view bytes);
 

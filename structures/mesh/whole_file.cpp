@@ -1,4 +1,4 @@
-#include "bench/records/files.hpp"
+#include "structures/mesh/whole_file.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -11,8 +11,6 @@
 #include <system_error>
 #include <utility>
 
-#include "bench/records/record_file.hpp"
-
 namespace amrtex {
 namespace {
 
@@ -21,7 +19,7 @@ namespace fs = std::filesystem;
 constexpr std::string_view kUnfinished = ".unfinished-";
 
 [[noreturn]] void fail(const fs::path& path, std::string_view what, int error) {
-  throw FolderError(fmt::format("{}: {}: {}", path.string(), what, std::system_category().message(error)));
+  throw OutputError(fmt::format("{}: {}: {}", path.string(), what, std::system_category().message(error)));
 }
 
 /// Has a name of its own until it gets its final one, and is removed where it never does.
