@@ -26,6 +26,18 @@ def _with_whole_paths(value, folder):
     return whole
 
 
+def read_records(folder):
+    """The records of a folder: the last line of each configuration, or, of older programs, a file each."""
+    lines = folder / "records.jsonl"
+    if not lines.exists():
+        return [json.loads(f.read_text()) for f in sorted((folder / "records").glob("*.json"))]
+    last = {}
+    for line in lines.read_text().splitlines():
+        record = json.loads(line)["record"]
+        last[record["configuration"], record["repetition"]] = record
+    return [last[key] for key in sorted(last)]
+
+
 def run(program, experiment, environment=None):
     """Runs an experiment in a folder of its own; its records. Ends the script where the program fails."""
     with tempfile.TemporaryDirectory() as folder:
@@ -36,7 +48,7 @@ def run(program, experiment, environment=None):
                               env={**os.environ, **(environment or {})}, check=False)
         if done.returncode != 0:
             raise SystemExit(f"{program} run, experiment {experiment['name']}: exit {done.returncode}\n{done.stdout}{done.stderr}")
-        return [json.loads(f.read_text()) for f in sorted((out / "records").glob("*.json"))]
+        return read_records(out)
 
 
 # what a record says of the point that was asked for; the rest is what came of it

@@ -110,7 +110,7 @@ class CommandLine : public testing::Test {
     return Json::parse(r.out);
   }
   std::vector<Json> records() const { return load_records(at("out")); }
-  fs::path some_record() const { return at("out") / "records" / names_in(at("out") / "records").front(); }
+  fs::path record_file() const { return at("out") / "records.jsonl"; }
 
  private:
   fs::path folder_;
@@ -631,43 +631,110 @@ TEST_F(CommandLine, RunWritesValidRecordsPicturesAndTables) {
     EXPECT_FALSE(record.at("image_hash").get<std::string>().empty());
   }
   EXPECT_THAT(names_in(at("out")),
-              ElementsAre("pictures", "records", "references", "shader_cache", "table.csv", "table.md", "table.tex"));
+              ElementsAre("pictures", "records.jsonl", "references", "shader_cache", "table.csv", "table.md", "table.tex"));
   EXPECT_THAT(names_in(at("out") / "pictures"), SizeIs(3));
-  for (const std::string& name : names_in(at("out") / "records")) EXPECT_THAT(name, testing::EndsWith(".json"));
 }
 
 TEST_F(CommandLine, RunGoesOnWhereItStopped) {
   EXPECT_EQ(counts_of_run(small_experiment()).at("measured"), 3);
-  std::map<std::string, std::string> before;
-  for (const std::string& name : names_in(at("out") / "records")) before[name] = read_text(at("out") / "records" / name);
+  const std::string before = read_text(record_file());
 
   const Json kept = counts_of_run(small_experiment());
-  EXPECT_EQ(kept, Json({{"measured", 0}, {"kept", 3}, {"unsupported", 0}, {"over_budget", 0}, {"failed", 0}}));
+  for (const char* none : {"measured", "unsupported", "over_budget", "failed", "left"}) EXPECT_EQ(kept.at(none), 0) << none;
+  EXPECT_EQ(kept.at("kept"), 3);
+  EXPECT_EQ(read_text(record_file()), before);
 
-  // as if it had been killed: one point has no record yet, and a temporary file is left
-  const fs::path lost = some_record();
-  fs::remove(lost);
-  write_text(at("out") / "records" / ".half.tmp", "{");
-  const Json resumed = counts_of_run(small_experiment());
+  // as if it had been killed: the last line is cut off, and files that were being written are left
+  write_text(record_file(), before.substr(0, before.size() - 100));
+  write_text(at("out") / "pictures" / ".unfinished-aaaaaa", "half");
+  const Result r = run(small_experiment(), {"--json"});
+  const Json resumed = Json::parse(r.out);
   EXPECT_EQ(resumed.at("measured"), 1);
   EXPECT_EQ(resumed.at("kept"), 2);
-  EXPECT_TRUE(fs::exists(lost));
-  for (const auto& [name, text] : before) {
-    if (name != lost.filename()) {
-      EXPECT_EQ(read_text(at("out") / "records" / name), text) << "a kept record was written again";
-    }
-  }
+  EXPECT_THAT(r.err, HasSubstr("records.jsonl:3: the last line is cut off"));
+  EXPECT_TRUE(read_text(record_file()).starts_with(before.substr(0, before.rfind('\n', before.size() - 2)))) << "a line was written again";
+  EXPECT_THAT(names_in(at("out") / "pictures"), SizeIs(3));
   EXPECT_THAT(records(), SizeIs(3));
 }
 
 TEST_F(CommandLine, ForceMeasuresAgain) {
   EXPECT_EQ(counts_of_run(one_point()).at("measured"), 1);
-  const std::string before = read_text(some_record());
+  const std::string before = read_text(record_file());
   const Result r = run(one_point(), {"--force", "--json"});
   EXPECT_EQ(Json::parse(r.out).at("measured"), 1);
   EXPECT_EQ(Json::parse(r.out).at("kept"), 0);
-  EXPECT_NE(read_text(some_record()), before);
+  EXPECT_TRUE(read_text(record_file()).starts_with(before));
+  EXPECT_GT(read_text(record_file()).size(), before.size());
   EXPECT_THAT(records(), SizeIs(1));
+}
+
+TEST_F(CommandLine, RunMeasuresThePointsThatOneChooses) {
+  const Result chosen = run(small_experiment(), {"--where", "page_size = 8", "--json"});
+  EXPECT_EQ(Json::parse(chosen.out).at("measured"), 1) << chosen.err;
+  ASSERT_THAT(records(), SizeIs(1));
+  EXPECT_EQ(records().front().at("build_parameters").at("page_size"), 8);
+  const std::string whole = records().front().at("configuration");
+
+  const Result listed = run(small_experiment(), {"--list-points"});
+  EXPECT_EQ(std::count(listed.out.begin(), listed.out.end(), '\n'), 3);
+  EXPECT_THAT(listed.out, AllOf(HasSubstr(whole + "  ok "), HasSubstr("  open ")));
+  const Result dry = run(small_experiment(), {"--dry-run"});
+  EXPECT_THAT(dry.out, AllOf(HasSubstr("3 points of 3 structures in 1 data sets, 2 of them open"), HasSubstr("to go")));
+  EXPECT_THAT(records(), SizeIs(1)) << "neither measures";
+
+  const Json only = Json::parse(run(small_experiment(), {"--only", whole.substr(0, 12), "--force", "--json"}).out);
+  EXPECT_EQ(only.at("measured"), 1);
+  expect_complaint(run(small_experiment(), {"--where", "page_sise = 8"}), 2,
+                   AllOf(HasSubstr("--where"), HasSubstr("did you mean 'page_size'?")));
+  expect_complaint(run(small_experiment(), {"--where", "page_size = 9"}), 2, HasSubstr("no point"));
+}
+
+TEST_F(CommandLine, RepetitionsAreRecordsOfTheirOwn) {
+  EXPECT_EQ(Json::parse(run(one_point(), {"--repeat", "2", "--json"}).out).at("measured"), 2);
+  std::set<int> repetitions;
+  for (const Json& record : records()) repetitions.insert(record.at("repetition").get<int>());
+  EXPECT_THAT(repetitions, ElementsAre(0, 1));
+  EXPECT_EQ(Json::parse(run(one_point(), {"--repeat", "3", "--json"}).out).at("measured"), 1);
+}
+
+TEST_F(CommandLine, AFailureIsKeptAndStaysOneUntilItIsTriedAgain) {
+  const Json impossible = with(one_point(), "check", Json{{"psnr_db", 900}});
+  EXPECT_EQ(run(impossible).exit_code, 1);
+  const Result kept = run(impossible, {"--json"});
+  EXPECT_EQ(kept.exit_code, 1) << "a kept failure is no success";
+  EXPECT_EQ(Json::parse(kept.out).at("failed"), 1);
+  EXPECT_EQ(Json::parse(kept.out).at("measured"), 0);
+  const std::string before = read_text(record_file());
+  EXPECT_EQ(run(impossible, {"--retry-failed"}).exit_code, 1);
+  EXPECT_GT(read_text(record_file()).size(), before.size());
+}
+
+TEST_F(CommandLine, NoTimeLeavesThePoints) {
+  const Result r = run(small_experiment(), {"--time-limit", "1e-9", "--json"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_EQ(Json::parse(r.out).at("left"), 3);
+  EXPECT_EQ(counts_of_run(small_experiment()).at("measured"), 3);
+}
+
+TEST_F(CommandLine, WithoutPicturesNoneAreKept) {
+  EXPECT_EQ(run(one_point(), {"--no-pictures"}).exit_code, 0);
+  EXPECT_FALSE(fs::exists(at("out") / "pictures"));
+}
+
+TEST_F(CommandLine, ADamagedReferenceIsDrawnAgain) {
+  EXPECT_EQ(counts_of_run(one_point()).at("measured"), 1);
+  const double psnr = records().front().at("error").at("psnr_db");
+  for (const std::string& name : names_in(at("out") / "references")) write_text(at("out") / "references" / name, "damaged");
+  EXPECT_EQ(Json::parse(run(one_point(), {"--force", "--json"}).out).at("measured"), 1);
+  EXPECT_EQ(records().front().at("error").at("psnr_db"), psnr);
+}
+
+TEST_F(CommandLine, AFolderThatCannotBeWrittenEndsTheRunAndIsNoRecord) {
+  fs::create_directories(at("out"));
+  write_text(at("out") / "pictures", "a file in the way");
+  expect_complaint(run(one_point()), 1, HasSubstr("pictures"));
+  fs::remove(at("out") / "pictures");
+  EXPECT_EQ(counts_of_run(one_point()).at("measured"), 1);
 }
 
 TEST_F(CommandLine, ReportMakesTheTablesFromRecordsAlone) {
@@ -741,8 +808,8 @@ TEST_F(CommandLine, AnOrbitIsATableOfCorrelationsAndADiagram) {
       EXPECT_THAT(panels[0]["layer"][1]["data"]["values"], SizeIs(4)) << "a point a view";
     }
   EXPECT_EQ(diagrams, 3) << "a diagram a structure";
-  for (const auto& entry : fs::directory_iterator(at("out") / "records")) {
-    const Json change = Json::parse(read_text(entry.path()))["change"];
+  for (const Json& record : records()) {
+    const Json& change = record.at("change");
     EXPECT_GT(change["wall_ms"]["median"].get<double>(), 0);
     EXPECT_GT(change["bytes"].get<int>(), 0);
   }

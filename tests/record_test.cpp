@@ -1,18 +1,21 @@
 #include "bench/records/record.hpp"
 
 #include <fcntl.h>
-#include <zlib.h>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <cmath>
+#include <csignal>
 #include <fstream>
+#include <functional>
+#include <iterator>
 #include <set>
 
-#include "structures/mesh/error.hpp"
+#include "bench/records/record_file.hpp"
+#include "structures/mesh/whole_file.hpp"
 
 namespace amrtex {
 namespace {
@@ -28,10 +31,6 @@ class RecordFolder : public testing::Test {
     fs::remove_all(folder_);
   }
   void TearDown() override { fs::remove_all(folder_); }
-
-  std::size_t files() const {
-    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_ / "records"), fs::directory_iterator()));
-  }
 
   fs::path folder_;
 };

@@ -4,6 +4,7 @@
 #include "bench/records/record.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
 #include "renderers/scene/scene_settings.hpp"
+#include "structures/mesh/whole_file.hpp"
 
 namespace amrtex {
 
@@ -18,9 +19,13 @@ Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definit
   key["method"] = 1;
   hash = configuration_hash(key);
   const fs::path path = folder / (hash + ".npy");
-  if (fs::exists(path)) return read_npy(path);
+  if (fs::exists(path)) try {
+      return read_npy(path);
+    } catch (const Error&) {
+      // damaged, by whatever befell the disk: what can be drawn again concerns no point
+    }
   const Picture picture = HierarchyReference(hierarchy, 0, definition).render(scene, step);
-  fs::create_directories(folder);
+  make_folder(folder);
   write_npy(picture, path, true);
   return picture;
 }

@@ -172,7 +172,7 @@ Json PointMeasurer::measure_one(const BuildPoint& build, Built& built, const Ren
   });
   if (!add_check(record, experiment_, build, scene.settings, own)) return record;  // a wrong picture gets no time
   if (options_.pictures) {
-    fs::create_directories(options_.folder / "pictures");
+    make_folder(options_.folder / "pictures");
     write_png(picture, options_.folder / "pictures" / (record["configuration"].get<std::string>() + ".png"));
   }
   options_.phase(Phase::drawing);

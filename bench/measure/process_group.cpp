@@ -73,7 +73,7 @@ ProcessGroups::Outcome ProcessGroups::timed_out(Phase phase, double seconds) {
   Outcome outcome;
   outcome.timed_out = true;
   outcome.phase = phase;
-  outcome.reason = fmt::format("took more than {:.0f} s of {}{}", seconds, phase == Phase::building ? "building" : "drawing",
+  outcome.reason = fmt::format("took more than {:.3g} s of {}{}", seconds, phase == Phase::building ? "building" : "drawing",
                                words.empty() ? "" : "; last words: " + words);
   return outcome;
 }

@@ -87,23 +87,6 @@ std::string read_compressed(const fs::path& path) {
   return text;
 }
 
-/// Collects the last record of each key in the order of the first.
-class LastOfEachKey {
- public:
-  void add(Json record) {
-    const auto [place, added] = places_.try_emplace(key_of(record), records_.size());
-    if (added)
-      records_.push_back(std::move(record));
-    else
-      records_[place->second] = std::move(record);
-  }
-  std::vector<Json> take() { return std::move(records_); }
-
- private:
-  std::map<RecordKey, std::size_t> places_;
-  std::vector<Json> records_;
-};
-
 }  // namespace
 
 std::string context_key(const Json& context) {
@@ -126,7 +109,7 @@ std::string record_line(const Json& record) {
 
 RecordLines parse_record_lines(std::string_view text, const std::string& name) {
   RecordLines lines;
-  LastOfEachKey records;
+  std::map<RecordKey, Json> records;
   std::size_t number = 0;
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = text.find('\n', at);
@@ -138,13 +121,13 @@ RecordLines parse_record_lines(std::string_view text, const std::string& name) {
     }
     Line line = read_line(text.substr(at, end - at), fmt::format("{}:{}", name, number));
     if (line.problem.empty())
-      records.add(std::move(line.record));
+      records[key_of(line.record)] = std::move(line.record);
     else
       lines.warnings.push_back(fmt::format("{}:{}: {}: its point is measured again", name, number, line.problem));
     at = end + 1;
     lines.whole_bytes = at;
   }
-  lines.records = records.take();
+  for (auto& [key, record] : records) lines.records.push_back(std::move(record));
   return lines;
 }
 
@@ -195,10 +178,7 @@ void RecordFile::take_over(const RecordLines& lines) {
   warnings_.insert(warnings_.end(), lines.warnings.begin(), lines.warnings.end());
   if (lines.torn && ::ftruncate(descriptor_, static_cast<off_t>(lines.whole_bytes)) != 0)
     throw OutputError(fmt::format("{}: its torn last line cannot be cut off: {}", path_.string(), reason()));
-  for (const Json& record : lines.records) {
-    order_.push_back(key_of(record));
-    last_[order_.back()] = record;
-  }
+  for (const Json& record : lines.records) last_[key_of(record)] = record;
 }
 
 const Json* RecordFile::find(const RecordKey& key) const {
@@ -208,7 +188,7 @@ const Json* RecordFile::find(const RecordKey& key) const {
 
 std::vector<Json> RecordFile::records() const {
   std::vector<Json> records;
-  for (const RecordKey& key : order_) records.push_back(last_.at(key));
+  for (const auto& [key, record] : last_) records.push_back(record);
   return records;
 }
 
@@ -225,8 +205,7 @@ void RecordFile::append(const Json& record) {
     static_cast<void>(::ftruncate(descriptor_, open_file.st_size));
     throw OutputError(fmt::format("{}: cannot be written: {}", path_.string(), std::system_category().message(error)));
   }
-  const RecordKey key = key_of(record);
-  if (last_.insert_or_assign(key, record).second) order_.push_back(key);
+  last_[key_of(record)] = record;
 }
 
 }  // namespace amrtex

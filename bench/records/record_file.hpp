@@ -29,7 +29,7 @@ std::string record_line(const Json& record);
 
 /// What a file of records holds.
 struct RecordLines {
-  std::vector<Json> records;          ///< the last of each key, in the order of the keys' first lines
+  std::vector<Json> records;          ///< the last of each key, in the order of the keys: that of the lines depends on when they were measured
   std::vector<std::string> warnings;  ///< of lines that cannot be read: each is as if it were not there
   std::uintmax_t whole_bytes = 0;     ///< up to the end of the last whole line
   bool torn = false;                  ///< is there a part of a line behind it?
@@ -55,7 +55,7 @@ class RecordFile {
   const std::vector<std::string>& warnings() const { return warnings_; }
   /// Null where there is none.
   const Json* find(const RecordKey& key) const;
-  /// The last record of each key.
+  /// The last record of each key, in their order.
   std::vector<Json> records() const;
 
   /// Validates and adds a line, which is on disk when this returns; or takes back what it wrote, and throws OutputError.
@@ -69,7 +69,6 @@ class RecordFile {
   std::filesystem::path path_;
   int descriptor_ = -1;
   std::vector<std::string> warnings_;
-  std::vector<RecordKey> order_;
   std::map<RecordKey, Json> last_;
 };
 

@@ -1,7 +1,6 @@
 #include "renderers/scene/picture.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 #include <xxhash.h>
 
 #include <bit>
@@ -13,6 +12,7 @@
 #include "structures/mesh/checked.hpp"
 #include "structures/mesh/error.hpp"
 #include "structures/mesh/quoted.hpp"
+#include "structures/mesh/whole_file.hpp"
 
 namespace amrtex {
 namespace {
@@ -81,28 +81,15 @@ std::string picture_hash(const Picture& picture) {
 }
 
 void write_npy(const Picture& picture, const std::filesystem::path& path, bool as_double) {
-  const std::string header = npy_header(picture, as_double);
-  const auto temporary = std::filesystem::path(fmt::format("{}.{}.part", path.string(), getpid()));
-  {
-    std::ofstream out(temporary, std::ios::binary);
-    out.write(header.data(), static_cast<std::streamsize>(header.size()));
-    const auto write = [&](const auto& values) {
-      out.write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(values[0])));
-    };
-    if (as_double)
-      write(picture.values);
-    else
-      write(as_floats(picture));
-    out.flush();
-    if (!out) {
-      std::error_code ignored;
-      std::filesystem::remove(temporary, ignored);
-      refuse(path, fmt::format("cannot be written: {}", std::strerror(errno)));
-    }
-  }
-  std::error_code failed;
-  std::filesystem::rename(temporary, path, failed);
-  if (failed) refuse(path, fmt::format("cannot be written: {}", failed.message()));
+  std::string bytes = npy_header(picture, as_double);
+  const auto add = [&](const auto& values) {
+    bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(values[0]));
+  };
+  if (as_double)
+    add(picture.values);
+  else
+    add(as_floats(picture));
+  write_atomically(path, bytes);
 }
 
 Picture read_npy(const std::filesystem::path& path) {

@@ -1,7 +1,6 @@
 // Pictures to look at: 8-bit sRGB, one-channel ones through a colour map.
 #include <fmt/format.h>
 #include <png.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +9,7 @@
 
 #include "renderers/scene/picture.hpp"
 #include "structures/mesh/error.hpp"
+#include "structures/mesh/whole_file.hpp"
 
 namespace amrtex {
 namespace {
@@ -162,14 +162,12 @@ void write_png(const Picture& picture, const std::filesystem::path& path, const 
   image.width = static_cast<png_uint_32>(canvas.width);
   image.height = static_cast<png_uint_32>(canvas.height);
   image.format = PNG_FORMAT_RGB;
-  const auto temporary = std::filesystem::path(fmt::format("{}.{}.part", path.string(), getpid()));
-  std::error_code failed;
-  if (png_image_write_to_file(&image, temporary.c_str(), 0, canvas.bytes.data(), 0, nullptr) == 0) {
-    std::filesystem::remove(temporary, failed);
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
+  std::string bytes(size, '\0');
+  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, canvas.bytes.data(), 0, nullptr) == 0)
     throw Error(fmt::format("{}: cannot be written: {}", path.string(), static_cast<const char*>(image.message)));
-  }
-  std::filesystem::rename(temporary, path, failed);
-  if (failed) throw Error(fmt::format("{}: cannot be written: {}", path.string(), failed.message()));
+  bytes.resize(size);
+  write_atomically(path, bytes);
 }
 
 }  // namespace amrtex

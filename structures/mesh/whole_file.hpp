@@ -21,6 +21,9 @@ int write_all(int descriptor, std::string_view bytes);
 /// naming the file.
 void write_atomically(const std::filesystem::path& target, std::string_view bytes);
 
+/// Makes a folder and those above it where they are not there. Throws OutputError.
+void make_folder(const std::filesystem::path& folder);
+
 /// Makes a rename in `folder` survive a power failure.
 void sync_folder(const std::filesystem::path& folder);
 
