@@ -31,17 +31,28 @@ void check_record_pointer(const JsonNode& node, const std::string& text) {
 }
 
 Conditions read_conditions(const JsonNode& node, Conditions where) {
-  if (const auto given = node.find("where"))
-    for (const auto& [pointer, value] : given->members()) {
-      check_record_pointer(value, pointer);
-      value.items();  // refuses the empty list
-      where.insert_or_assign(pointer, value.json());
+  const auto given = node.find("where");
+  if (!given) return where;
+  if (given->json().is_string()) {
+    try {
+      where.queries.push_back(std::make_shared<const PointQuery>(given->text(), "where"));
+    } catch (const UsageError& error) {
+      given->fail(error.what());
     }
+    return where;
+  }
+  for (const auto& [pointer, value] : given->members()) {
+    check_record_pointer(value, pointer);
+    value.items();  // refuses the empty list
+    where.values.insert_or_assign(pointer, value.json());
+  }
   return where;
 }
 
 bool matches(const Json& record, const Conditions& where) {
-  return std::all_of(where.begin(), where.end(), [&](const auto& c) { return accepts(c.second, value_at(record, c.first)); });
+  return std::all_of(where.values.begin(), where.values.end(),
+                     [&](const auto& c) { return accepts(c.second, value_at(record, c.first)); }) &&
+         std::all_of(where.queries.begin(), where.queries.end(), [&](const auto& query) { return query->holds(record); });
 }
 
 }  // namespace amrtex

@@ -184,7 +184,7 @@ struct Finding {
 
 Finding find_amount(const Quantity& quantity, const std::string& dataset, const Records& records) {
   Conditions where = quantity.where;
-  where.try_emplace("/dataset/name", dataset);  // a row may choose another data set for all columns
+  where.values.try_emplace("/dataset/name", dataset);  // a row may choose another data set for all columns
   std::map<std::string, Records> by_status;
   for (const Json* record : records)
     if (matches(*record, where)) by_status[record->at("status")].push_back(record);
