@@ -709,6 +709,22 @@ TEST_F(CommandLine, AFailureIsKeptAndStaysOneUntilItIsTriedAgain) {
   EXPECT_GT(read_text(record_file()).size(), before.size());
 }
 
+TEST_F(CommandLine, ARecordIsMeasuredAgainFromItselfAlone) {
+  EXPECT_EQ(counts_of_run(small_experiment()).at("measured"), 3);
+  const std::vector<Json> before = records();
+  for (const Json& record : before) {
+    const std::string hash = record.at("configuration");
+    fs::remove_all(at("again"));
+    const Result r = amrtex({"run", "--from-record", record_file().string(), hash.substr(0, 10), "--out", at("again").string(), "--json"});
+    EXPECT_EQ(Json::parse(r.out).at("measured"), 1) << r.err;
+    const Json again = load_records(at("again")).at(0);
+    EXPECT_EQ(again.at("configuration"), hash);
+    EXPECT_EQ(again.at("image_hash"), record.at("image_hash"));
+  }
+  expect_complaint(amrtex({"run", "--from-record", record_file().string(), "zz", "--out", at("again").string()}), 2,
+                   AllOf(HasSubstr("--from-record: 0 points"), HasSubstr("'zz'")));
+}
+
 TEST_F(CommandLine, NoTimeLeavesThePoints) {
   const Result r = run(small_experiment(), {"--time-limit", "1e-9", "--json"});
   EXPECT_EQ(r.exit_code, 0) << r.err;

@@ -638,6 +638,30 @@ TEST(PointConfiguration, IsUniqueForEveryPointAndTheSameInEveryRun) {
   EXPECT_EQ(hashes(), first);
 }
 
+// A record holds the experiment of its point alone, by which it can be measured again: it must say everything.
+TEST(PointExperiments, MakeTheSamePointOfEveryCommittedExperiment) {
+  int points = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(fs::path(AMRTEX_SOURCE_DIR) / "experiments")) {
+    const std::string name = entry.path().filename().string();
+    if (entry.path().extension() != ".json" || entry.path().string().find("/results") != std::string::npos || name == "tables.json" ||
+        name == "columns.json" || name.ends_with(".vl.json"))
+      continue;
+    const Experiment whole = name.find("scene") == 0 ? read_scene(entry.path()) : read_experiment(entry.path());
+    // each build with the first picture, the first build with each picture
+    for (std::size_t i = 0; i < std::max(whole.builds.size(), whole.renders.size()); ++i) {
+      const BuildPoint& build = whole.builds[std::min(i, whole.builds.size() - 1)];
+      const RenderPoint& render = whole.renders[std::min(i, whole.renders.size() - 1)];
+      const Json file = point_experiment(whole, build, render);
+      const Experiment alone = parse_experiment(file.dump(), entry.path());
+      ASSERT_EQ(alone.points(), 1U) << entry.path() << file.dump(1);
+      ASSERT_EQ(point_configuration(alone, alone.builds[0], alone.renders[0], "data"), point_configuration(whole, build, render, "data"))
+          << entry.path() << file.dump(1);
+      ++points;
+    }
+  }
+  EXPECT_GT(points, 100);
+}
+
 TEST(PointConfiguration, ChangesWithMeshSettingsAndReferenceButNotWithNames) {
   const auto hash = [](const std::string& text, const char* mesh) {
     const Experiment e = parsed(text);

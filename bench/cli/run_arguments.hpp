@@ -13,6 +13,7 @@ namespace amrtex {
 /// All that says which experiment it is and where it goes.
 struct RunArguments {
   std::string input, output, context, memory_limit;
+  std::vector<std::string> record;  ///< a file of records, and a configuration: the experiment is that of this point
   std::vector<std::string> set;
   std::uint64_t max_points = ReadOptions{}.most_points;
   bool no_pictures = false;

@@ -49,6 +49,7 @@ void describe_point(Json& record, const Experiment& experiment, LoadedData& data
   record["implementation"] = run.implementation;
   record["repetition"] = 0;
   record["process_peak_bytes"] = json_or_null(process_peak_bytes());
+  record["asked"] = point_experiment(experiment, build, render);
   record["dataset"] = dataset_json(data, render);
   record["encoding"] = build.encoding;
   record["build_parameters"] = build.parameters;

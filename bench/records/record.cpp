@@ -36,6 +36,7 @@ constexpr Rule kRules[] = {
     {"/configuration", Kind::string, true, 2},
     {"/implementation", Kind::string, true, 2},
     {"/repetition", Kind::integer, true, 2},
+    {"/asked", Kind::object, true, 2},
     {"/dataset", Kind::object},
     {"/dataset/name", Kind::string},
     {"/dataset/source", Kind::string_or_object, true, 2},

@@ -107,6 +107,10 @@ Scene scene_of(const Experiment& experiment, const RenderPoint& render);
 /// The `render` part of a record, names of view and transfer function included.
 Json render_json(const RenderPoint& render);
 
+/// An experiment file of this point alone: `parse_experiment` makes the same point of it. The data set's path is relative to the folder that the
+/// program runs in, where it lies below that.
+Json point_experiment(const Experiment& experiment, const BuildPoint& build, const RenderPoint& render);
+
 /// Everything that decides what a point measures, for `configuration_hash`; keys at their default are left out, so that a key
 /// that is added later renames no record. `dataset_hash` is that of the mesh as loaded.
 Json point_configuration(const Experiment& experiment, const BuildPoint& build, const RenderPoint& render,
