@@ -192,6 +192,27 @@ TEST(Layout, NamesTheLargestPartWhereTheBudgetIsPassed) {
                     HasSubstr("; fewer words would do")));
 }
 
+TEST(Layout, RefusesSizesThatPass63BitsInsteadOfWrappingRound) {
+  const Declared encoding;
+  BuildRequest request;
+  request.memory_limit = CheckedSize::kMost - 1;
+  request.context.max_buffer_bytes = CheckedSize::kMost;
+  // 2^21 texels along each axis are 2^63, and 2^62 words are 2^64 bytes
+  const Part texture = texture_part("tex_values", "values", TexelFormat::r8, Vec3i(1 << 21));
+  const Part buffer = buffer_part("words", "entries", TexelFormat::r32ui, std::int64_t{1} << 62);
+  for (const Part& part : {texture, buffer}) {
+    EXPECT_EQ(part.bytes(), CheckedSize::kMost) << part.name;
+    Layout layout(encoding, request);
+    layout.add(part);
+    layout.add(buffer_part("more", "others", TexelFormat::r32ui, 1));
+    layout.add_working(1);
+    EXPECT_EQ(layout.bytes(), CheckedSize::kMost);
+    EXPECT_THROW(layout.require_budget(), BudgetError);
+    EXPECT_THROW(layout.require_limits(), UnsupportedError) << "a buffer's elements are counted in 31 bits";
+  }
+  EXPECT_EQ(Layout(encoding, request).value_bytes(std::int64_t{1} << 62), CheckedSize::kMost);
+}
+
 // ---- of every encoding
 
 void expect_parts_are_what_is_there(const EncodedField& field) {

@@ -12,9 +12,11 @@
 #include <functional>
 #include <random>
 
+#include "bench/settings/experiment.hpp"
 #include "bench/settings/json_file.hpp"
 #include "renderers/scene/picture.hpp"
 #include "renderers/scene/triangle_reader.hpp"
+#include "structures/common/encoding.hpp"
 #include "structures/generators/synthetic.hpp"
 #include "structures/mesh/amr_hierarchy.hpp"
 #include "structures/mesh/checked.hpp"
@@ -70,6 +72,13 @@ class BadFiles : public testing::Test {
     const fs::path path = write(name, bytes);
     return answer([&] { read_triangles(path); });
   }
+  /// One that draws these triangles, beside the folder's other files.
+  std::string answer_to_experiment(const std::string& triangles) const {
+    const std::string text = fmt::format(R"({{"datasets": [{{"generate": {{"field": "blobs_shell", "levels": 2}}}}],
+      "encodings": [{{"name": "uniform"}}], "render": {{"triangles": [{{"file": "{}"}}]}}}})",
+                                         triangles);
+    return answer([&] { parse_experiment(text, folder_ / "experiment/e.json"); });
+  }
 
   fs::path folder_;
 };
@@ -109,6 +118,20 @@ TEST(ForeignText, OfAMessageIsOneLineOfBoundedLength) {
   const std::string line = one_line("file: " + std::string(5000, 'x') + "; accepted: a, b", 400);
   EXPECT_EQ(line.size(), 400U);
   EXPECT_THAT(line, AllOf(StartsWith("file: xxx"), HasSubstr("x ... x"), testing::EndsWith("; accepted: a, b")));
+}
+
+TEST(ForeignText, OfNamesAndValuesIsCutAndEscapedInTheMessagesOfEncodings) {
+  const std::string name = "\x1b[2J" + std::string(500, 'x');
+  std::vector<std::function<void()>> actions = {[&] { parse_storage(name); }, [&] { parse_filtering(name); },
+                                                [&] { parse_filter(name); }, [&] { find_encoding(name); }};
+  for (const Encoding* encoding : all_encodings()) {
+    actions.push_back([&name, encoding] { complete_parameters(*encoding, {{name, 1}}); });
+    for (const ParameterInfo& parameter : encoding->parameters())
+      actions.push_back([&name, encoding, key = parameter.name] { complete_parameters(*encoding, {{key, name + "\xff"}}); });
+  }
+  for (const auto& action : actions)
+    EXPECT_THAT(answer(action), AllOf(HasSubstr("\\x1b[2Jxxx"), Not(HasSubstr("\x1b")), Not(HasSubstr("\xff")),
+                                      Not(HasSubstr(std::string(80, 'x')))));
 }
 
 // ---- sizes ----
@@ -301,11 +324,18 @@ TEST_F(BadFiles, WhatALinkLeadsToIsNotQuoted) {
   EXPECT_THAT(answer([&] { read_mesh(folder_ / "plt"); }),
               AllOf(HasSubstr("its first line is something else"), Not(HasSubstr("root"))));
   for (const char* name : {"t.ply", "t.stl", "t.obj"}) {
-    const fs::path target = write(std::string("elsewhere/") + name, "v root:x:0:0\n");
+    const fs::path target = write(std::string("elsewhere/") + name, "v root:x:0:0 1 2\n");
     fs::create_directories(folder_ / "linked");
     fs::create_symlink(target, folder_ / "linked" / name);
     EXPECT_THAT(answer([&] { read_triangles(folder_ / "linked" / name); }), AllOf(HasSubstr(name), Not(HasSubstr("root"))));
   }
+  // a path of an experiment may go through a linked folder, and leave its own by itself
+  const fs::path inside = write("experiment/models/t.obj", "v a:b 1 2\n");
+  fs::create_directory_symlink(folder_ / "elsewhere", folder_ / "experiment/link");
+  for (const char* way : {"link/t.obj", "models/../../elsewhere/t.obj"})
+    EXPECT_THAT(answer_to_experiment(way), AllOf(HasSubstr("t.obj"), HasSubstr("something else"), Not(HasSubstr("root")))) << way;
+  EXPECT_THAT(answer_to_experiment("models/t.obj"), HasSubstr("'a:b'"));
+  EXPECT_THAT(answer_to_experiment(inside.string()), HasSubstr("'a:b'")) << "named in full";
   // a data set that is itself reached by a link is the user's own
   fs::create_directories(folder_ / "own");
   std::ofstream(folder_ / "own/Header") << "hello\n";

@@ -78,7 +78,7 @@ Json default_transfer_function(const AmrHierarchy& mesh) {
   const FieldStatistics& range = mesh.statistics(0);
   if (!(range.max > range.min))
     throw UsageError(fmt::format("{}: the field {} is {} everywhere; accepted: a field with a range, or --transfer-function",
-                                 mesh.name(), mesh.fields().front(), range.min));
+                                 clipped(mesh.name()), clipped(mesh.fields().front()), range.min));
   const auto value = [&](double share) { return range.min + share * (range.max - range.min); };
   return {{"extinction", {{value(0.1), 0}, {value(1), 20}}},
           {"color", {{value(0), 0.1, 0.2, 0.8}, {value(0.5), 0.9, 0.9, 0.9}, {value(1), 0.8, 0.1, 0.1}}}};
@@ -86,7 +86,9 @@ Json default_transfer_function(const AmrHierarchy& mesh) {
 
 /// The scene as a file would say it, but for what is sought.
 Json scene_json(const Arguments& a, const AmrHierarchy& mesh) {
-  Json dataset = {{"file", fs::absolute(a.data).lexically_normal().string()}, {"field", mesh.fields().front()}};
+  const std::string file = fs::absolute(a.data).lexically_normal().string();
+  if (!is_utf8(file)) throw UsageError(fmt::format("{}: a path that is not UTF-8 cannot stand in a scene", clipped(file)));
+  Json dataset = {{"file", file}, {"field", mesh.fields().front()}};
   return {{"name", "advise"},
           {"datasets", Json::array({dataset})},
           {"encodings", Json::array({{{"name", all_encodings().front()->name()}}})},

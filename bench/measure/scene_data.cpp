@@ -7,6 +7,7 @@
 #include "bench/records/record.hpp"
 #include "renderers/scene/triangle_mesh.hpp"
 #include "structures/mesh/exact_hash.hpp"
+#include "structures/mesh/quoted.hpp"
 #include "structures/readers/mesh_io.hpp"
 
 namespace amrtex {
@@ -57,7 +58,7 @@ std::vector<std::string> scene_warnings(const AmrHierarchy& hierarchy, const Sce
   for (const double isovalue : scene.settings.isosurfaces.values)
     if (!(isovalue >= range.min && isovalue <= range.max))
       warnings.push_back(fmt::format("isovalue {} lies outside the range of {}, {} to {}: it has no surface", isovalue,
-                                     hierarchy.fields().front(), range.min, range.max));
+                                     clipped(hierarchy.fields().front()), range.min, range.max));
   return warnings;
 }
 

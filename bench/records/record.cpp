@@ -16,6 +16,7 @@
 #include "bench/numbers/statistics.hpp"
 #include "bench/settings/json_file.hpp"
 #include "structures/mesh/error.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 namespace {
@@ -190,7 +191,7 @@ void check_rule(const Json& record, const Rule& rule) {
 void check_status(const Json& record) {
   const auto status = record.at("status").get<std::string>();
   if (std::none_of(std::begin(kStatuses), std::end(kStatuses), [&](Status s) { return status_name(s) == status; }))
-    fail("/status", fmt::format("'{}' is none of ok, unsupported, failed, over_budget", status));
+    fail("/status", fmt::format("{} is none of ok, unsupported, failed, over_budget", quote(status)));
   const bool ok = status == status_name(Status::ok);
   if (ok != record.at("reason").is_null())
     fail("/reason", ok ? "must be null where the status is ok" : "must say why the status is not ok");

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "bench/records/record.hpp"
+#include "structures/mesh/quoted.hpp"
 #include "structures/mesh/suggestion.hpp"
 
 namespace amrtex {
@@ -25,8 +26,8 @@ void check_record_pointer(const JsonNode& node, const std::string& text) {
   const bool escapes = text.find('~') != std::string::npos;  // no key of a record needs them
   if (!escapes && std::find(keys.begin(), keys.end(), first) != keys.end()) return;
   const std::vector<std::string_view> names(keys.begin(), keys.end());
-  node.fail(fmt::format("'{}' is no place in a record; accepted: a JSON pointer as /render/mode that begins with one of {}{}",
-                        text, fmt::join(names, ", "), suggestion(first, names)));
+  node.fail(fmt::format("{} is no place in a record; accepted: a JSON pointer as /render/mode that begins with one of {}{}",
+                        quote(text), fmt::join(names, ", "), suggestion(first, names)));
 }
 
 Conditions read_conditions(const JsonNode& node, Conditions where) {

@@ -15,6 +15,7 @@
 #include "bench/records/record_conditions.hpp"
 #include "bench/report/report.hpp"
 #include "bench/settings/json_file.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 namespace {
@@ -104,7 +105,7 @@ Entry read_entry(const JsonNode& node) {
     for (const JsonNode& note : notes->items()) entry.notes.push_back(note.text());
   for (const JsonNode& name : node.require("datasets").items()) {
     if (std::find(entry.datasets.begin(), entry.datasets.end(), name.text()) != entry.datasets.end())
-      name.fail(fmt::format("the data set '{}' is given twice", name.text()));
+      name.fail(fmt::format("the data set {} is given twice", quote(name.text())));
     entry.datasets.push_back(name.text());
   }
   const Conditions where = read_conditions(node, {});
@@ -170,8 +171,9 @@ std::vector<std::string> differing_settings(const Records& records) {
 }
 
 [[noreturn]] void fail_ambiguous(const Quantity& quantity, const std::string& dataset, const Records& matches) {
-  quantity.node.fail(fmt::format("row '{}', data set '{}': {} records with different values match; they differ in: {}",
-                                 quantity.label, dataset, matches.size(), fmt::join(differing_settings(matches), ", ")));
+  quantity.node.fail(fmt::format("row {}, data set {}: {} records with different values match; they differ in: {}",
+                                 quote(quantity.label), quote(dataset), matches.size(),
+                                 fmt::join(differing_settings(matches), ", ")));
 }
 
 struct Finding {

@@ -13,6 +13,7 @@
 #include "bench/settings/json_file.hpp"
 #include "bench/settings/settings_table.hpp"
 #include "structures/mesh/error.hpp"
+#include "structures/mesh/quoted.hpp"
 #include "structures/mesh/suggestion.hpp"
 
 namespace amrtex {
@@ -291,7 +292,7 @@ const ColumnRule& find_rule(std::string_view key) {
   for (const ColumnRule& rule : all_columns())
     if (key == rule.key) return rule;
   const auto keys = column_keys();
-  throw UsageError(fmt::format("no column '{}'; accepted: {}{}", key, fmt::join(keys, ", "), suggestion(key, keys)));
+  throw UsageError(fmt::format("no column {}; accepted: {}{}", quote(key), fmt::join(keys, ", "), suggestion(key, keys)));
 }
 
 // --- the order of rows ---

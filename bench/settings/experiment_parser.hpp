@@ -38,8 +38,12 @@ std::vector<RenderPoint> parse_transfer_functions(ExperimentParser& parser, bool
 /// `reference`, and keys that hold for a whole experiment. After parse_renders.
 void parse_measuring(ExperimentParser& parser);
 
+struct ExistingPath {
+  std::filesystem::path path;
+  std::filesystem::path folder;  ///< that a relative path begins in; else that around the file
+};
 /// A file or folder beside the experiment file, or else in the current folder. Throws a UsageError that names both places.
-std::filesystem::path existing_path(const JsonNode& node, const JsonFile& file);
+ExistingPath existing_path(const JsonNode& node, const JsonFile& file);
 
 /// Runs a parser of another part of the program and adds file, line and key to its complaint.
 template <class F>

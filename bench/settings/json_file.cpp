@@ -10,8 +10,8 @@
 
 #include "structures/mesh/error.hpp"
 #include "structures/mesh/quoted.hpp"
-#include "structures/readers/reader_tools.hpp"
 #include "structures/mesh/suggestion.hpp"
+#include "structures/readers/reader_tools.hpp"
 
 namespace amrtex {
 namespace {
@@ -226,11 +226,12 @@ void JsonFile::set(const std::string& place, Json value, const std::string& orig
                              ? json->size()
                              : static_cast<std::size_t>(std::stoul(step));
       if (!json->is_array() || index >= json->size())
-        throw UsageError(fmt::format("{}: no element [{}]; the list has {}", origin, step, json->is_array() ? json->size() : 0));
+        throw UsageError(
+            fmt::format("{}: no element [{}]; the list has {}", origin, clipped(step), json->is_array() ? json->size() : 0));
       json = &(*json)[index];
     } else {
       if (!json->is_object() && !json->is_null())
-        throw UsageError(fmt::format("{}: '{}' has no place in {}", origin, step, shown(*json)));
+        throw UsageError(fmt::format("{}: {} has no place in {}", origin, quote(step), shown(*json)));
       json = &(*json)[step];
     }
   }

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "bench/settings/settings_table.hpp"
+#include "structures/mesh/quoted.hpp"
 #include "structures/mesh/suggestion.hpp"
 
 namespace amrtex {
@@ -60,12 +61,13 @@ std::string whole_path(const std::string& path, const std::string& origin) {
   if (places.size() == 1) return places.front() + "." + path;
   if (places.empty()) {
     const std::vector<std::string> all = all_names();
-    throw UsageError(fmt::format("{}: no key '{}'{}; `amrtex settings` lists all", origin, head,
+    throw UsageError(fmt::format("{}: no key {}{}; `amrtex settings` lists all", origin, quote(head),
                                  suggestion(head, Names(all.begin(), all.end()))));
   }
   std::vector<std::string> accepted;
   for (const std::string& place : places) accepted.push_back(place + "." + path);
-  throw UsageError(fmt::format("{}: '{}' is a key of several objects; accepted: {}", origin, head, fmt::join(accepted, ", ")));
+  throw UsageError(
+      fmt::format("{}: {} is a key of several objects; accepted: {}", origin, quote(head), fmt::join(accepted, ", ")));
 }
 
 /// Has this entry of `encodings` the parameter?
@@ -109,7 +111,8 @@ void expand(const Json& json, const std::string& done, std::string_view rest, st
 }  // namespace
 
 void override_setting(JsonFile& file, const std::string& text) {
-  const std::string origin = "--set " + shown_name(text);
+  const std::string origin = "--set " + clipped(text);
+  if (!is_utf8(text)) throw UsageError(fmt::format("{}: not UTF-8; accepted: key=value", origin));
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0)
     throw UsageError(fmt::format("{}: accepted: key=value, as in render.step=0.5", origin));
@@ -122,7 +125,8 @@ void override_setting(JsonFile& file, const std::string& text) {
   const Json root = file.root().json();
   expand(root.is_object() && root.contains(head) ? root[head] : Json(), head, std::string_view(path).substr(head.size()), places);
   if (places.empty())
-    throw UsageError(fmt::format("{}: no encoding of this file has the parameter '{}'", origin, path.substr(path.find('.') + 1)));
+    throw UsageError(
+        fmt::format("{}: no encoding of this file has the parameter {}", origin, quote(path.substr(path.find('.') + 1))));
   for (const std::string& place : places) file.set(place, value, origin);
 }
 

@@ -44,7 +44,7 @@ std::string file_name(const std::filesystem::path& path) {
 void parse_files(ExperimentParser& parser, const JsonNode& node) {
   for (const Choice& choice : parser.axes.combinations(node, depths_of(section_of("datasets").keys))) {
     DatasetSource source;
-    source.file = existing_path(*find(choice, "file"), parser.file);
+    source.file = existing_path(*find(choice, "file"), parser.file).path;
     source.written = find(choice, "file")->text();
     if (const JsonNode* field = find(choice, "field"); field != nullptr && !field->json().is_null()) source.field = field->text();
     const JsonNode* name = find(choice, "name");
@@ -68,16 +68,20 @@ void parse_datasets(ExperimentParser& parser) {
   }
 }
 
-std::filesystem::path existing_path(const JsonNode& node, const JsonFile& file) {
+ExistingPath existing_path(const JsonNode& node, const JsonFile& file) {
   const std::filesystem::path given = node.text();
+  const std::filesystem::path around = file.path().has_parent_path() ? file.path().parent_path() : std::filesystem::path(".");
   const std::filesystem::path beside = file.path().parent_path() / given;  // `given` where that is absolute
   std::error_code ignored;
-  if (!given.empty() && std::filesystem::exists(beside, ignored)) return beside;
-  if (!given.empty() && std::filesystem::exists(given, ignored)) return given;
+  if (!given.empty() && std::filesystem::exists(beside, ignored))
+    return {beside, given.is_absolute() ? given.parent_path() : around};
+  if (!given.empty() && std::filesystem::exists(given, ignored)) return {given, "."};
   if (given.empty()) node.fail("an empty path; accepted: a file or a folder");
-  if (given.is_absolute()) node.fail(fmt::format("{}: {}", clipped(given.string()), why_absent(given)));
-  const auto here = std::filesystem::current_path(ignored) / given;
-  node.fail(fmt::format("{}: {}; {}: {}", beside.string(), why_absent(beside), here.string(), why_absent(here)));
+  const std::filesystem::path shown = clipped(given.string());
+  if (given.is_absolute()) node.fail(fmt::format("{}: {}", shown.string(), why_absent(given)));
+  const auto current = std::filesystem::current_path(ignored);
+  node.fail(fmt::format("{}: {}; {}: {}", (file.path().parent_path() / shown).string(), why_absent(beside),
+                        (current / shown).string(), why_absent(current / given)));
 }
 
 }  // namespace amrtex

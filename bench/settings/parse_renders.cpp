@@ -15,9 +15,9 @@ void load_triangles(const ExperimentParser& parser, const JsonNode& node, std::v
   const std::vector<JsonNode> items = node.items();
   for (std::size_t i = 0; i < objects.size(); ++i) {
     const JsonNode file = items[i].require("file");
-    const std::filesystem::path path = existing_path(file, parser.file);
-    std::shared_ptr<const TriangleMesh>& mesh = meshes[path.string()];
-    if (!mesh) located(file, [&] { mesh = std::make_shared<const TriangleMesh>(read_triangles(path)); });
+    const ExistingPath found = existing_path(file, parser.file);
+    std::shared_ptr<const TriangleMesh>& mesh = meshes[found.path.string()];
+    if (!mesh) located(file, [&] { mesh = std::make_shared<const TriangleMesh>(read_triangles(found.path, found.folder)); });
     objects[i].mesh = mesh;
   }
 }

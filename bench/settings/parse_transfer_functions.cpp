@@ -4,6 +4,7 @@
 
 #include "bench/settings/experiment_parser.hpp"
 #include "structures/generators/analytic_fields.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 namespace {
@@ -35,7 +36,7 @@ class FunctionsOfFields {
       const JsonNode field = node.require("field");
       const std::string name = field.text();
       if (std::find(names.begin(), names.end(), name) != names.end())
-        field.fail(fmt::format("'{}' has a transfer function already; accepted: each field once", name));
+        field.fail(fmt::format("{} has a transfer function already; accepted: each field once", quote(name)));
       const TransferFunction tf = parse_function(node);
       if (names.empty()) {
         point.transfer_function = tf;
@@ -63,9 +64,8 @@ class FunctionsOfFields {
     for (DatasetSource& source : parser_.experiment.datasets) {
       const std::string name = source.file ? source.field.value_or(field.text()) : analytic_field_type(source.generate);
       if (name != field.text())
-        field.fail(
-            fmt::format("the data set {} draws the field '{}', to which the first transfer function belongs; accepted: '{}'",
-                        source.name, name, name));
+        field.fail(fmt::format("the data set {} draws the field {}, to which the first transfer function belongs; accepted: {}",
+                               clipped(source.name), quote(name), quote(name)));
       if (source.file) source.field = name;
     }
   }

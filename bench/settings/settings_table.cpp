@@ -9,6 +9,7 @@
 
 #include "bench/settings/orbit.hpp"
 #include "renderers/scene/scene_names.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 namespace {
@@ -78,14 +79,16 @@ SettingTable<Experiment> make_experiment_settings() {
                    .label = true},
                   [](const Experiment& e) -> Json { return e.name; },
                   [](Experiment& e, const Json& v) { e.name = v.get<std::string>(); }});
-  rows.push_back({{.name = "check",
-                   .type = object_type(check_members()).or_null(),
-                   .reference = AffectsReference::no,
-                   .help = "a picture that is worse against its own reference has failed and gets no time. `null`: the bound that its "
-                           "filter, storage, sampling, step and integrator let expect "
-                           "([bench/README.md](../bench/README.md#check)); a bound of your own; or `off`, with the reason",
-                   .default_text = "`null`: the default bound"},
-                  check_json, set_check});
+  rows.push_back(
+      {{.name = "check",
+        .type = object_type(check_members()).or_null(),
+        .reference = AffectsReference::no,
+        .help = "a picture that is worse against its own reference has failed and gets no time. `null`: the bound that its "
+                "filter, storage, sampling, step and integrator let expect "
+                "([bench/README.md](../bench/README.md#check)); a bound of your own; or `off`, with the reason",
+        .default_text = "`null`: the default bound"},
+       check_json,
+       set_check});
   rows.push_back(flag<&Experiment::baseline>(
       "baseline", "time the data set's first build, with the first render settings, before and after every point"));
   rows.push_back(flag<&Experiment::explain_error>(
@@ -366,7 +369,7 @@ const Section& section_of(std::string_view name) {
     if (section.name == name) return section;
   std::vector<std::string> names;
   for (const Section& section : all_sections()) names.push_back(section.name);
-  throw UsageError(fmt::format("no section '{}'; accepted: {}", name, fmt::join(names, ", ")));
+  throw UsageError(fmt::format("no section {}; accepted: {}", quote(name), fmt::join(names, ", ")));
 }
 
 std::vector<std::string_view> names_of(std::span<const Key* const> keys) {

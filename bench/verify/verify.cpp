@@ -9,6 +9,8 @@
 #include <cmath>
 #include <map>
 
+#include "structures/mesh/quoted.hpp"
+
 namespace amrtex::verify {
 namespace {
 
@@ -148,7 +150,7 @@ const Suite& find_suite(std::string_view name) {
     if (s.name == name) return s;
     names.push_back(s.name);
   }
-  throw UsageError(fmt::format("no suite '{}'; accepted: {}", name, fmt::join(names, ", ")));
+  throw UsageError(fmt::format("no suite {}; accepted: {}", quote(name), fmt::join(names, ", ")));
 }
 
 Json to_json(const Report& report) {

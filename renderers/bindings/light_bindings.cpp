@@ -10,6 +10,7 @@
 #include "renderers/scene/triangle_layer.hpp"
 #include "structures/common/build_tools.hpp"
 #include "structures/mesh/error.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 namespace {
@@ -34,10 +35,10 @@ void add_surface_map(const Scene& scene, int fields, SceneBindings& b) {
   const bool mapped = !iso.color_field.empty() && iso.output == Output::color;
   const TransferFunction map = surface_colors(scene);
   if (map.color.size() > kMostExactPoints)
-    throw UsageError(fmt::format("surfaces coloured by the field '{}': {} colour points; at most {} are supported",
-                                 iso.color_field, map.color.size(), kMostExactPoints));
+    throw UsageError(fmt::format("surfaces coloured by the field {}: {} colour points; at most {} are supported",
+                                 quote(iso.color_field), map.color.size(), kMostExactPoints));
   if (mapped && fields < 2)
-    throw Error(fmt::format("surfaces coloured by the field '{}': the structure was built without it", iso.color_field));
+    throw Error(fmt::format("surfaces coloured by the field {}: the structure was built without it", quote(iso.color_field)));
   if (mapped) b.set("u_surface_points", color_points(map));
   b.define("AMRTEX_SURFACE_POINTS", mapped ? static_cast<int>(map.color.size()) : 0);
   b.define("AMRTEX_SURFACE_LOGARITHMIC", mapped && map.logarithmic ? 1 : 0);

@@ -7,6 +7,7 @@
 #include "renderers/scene/scene_rows.hpp"
 #include "renderers/scene/scene_settings.hpp"
 #include "renderers/scene/triangle_mesh.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex::scene_rows {
 namespace {
@@ -28,8 +29,8 @@ std::string fields_problem(const Scene& scene) {
   const auto too_long = [](const TransferFunction& tf, std::string_view field) -> std::string {
     for (const auto& [curve, points] : {std::pair("extinction", tf.extinction.size()), std::pair("color", tf.color.size())})
       if (points > kMostExactPoints)
-        return fmt::format("'{}' of {} has {} points; with several fields at most {} are supported", curve, field, points,
-                           kMostExactPoints);
+        return fmt::format("'{}' of {} has {} points; with several fields at most {} are supported", curve, clipped(field),
+                           points, kMostExactPoints);
     return "";
   };
   std::string problem = too_long(scene.transfer_function, "the first field");

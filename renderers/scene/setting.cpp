@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "structures/mesh/quoted.hpp"
 #include "structures/mesh/suggestion.hpp"
 
 namespace amrtex {
@@ -13,7 +14,7 @@ namespace {
 
 constexpr double kLargest = std::numeric_limits<double>::max();
 
-std::string text_of(const Json& value) { return value.is_string() ? value.get<std::string>() : shown_value(value); }
+std::string text_of(const Json& value) { return value.is_string() ? clipped(value.get_ref<const std::string&>()) : shown(value); }
 
 /// "a", "a and b", "a, b and c".
 std::string enumerated(const std::vector<Json>& values) {
@@ -82,17 +83,16 @@ bool is_integer(const Json& value) {
 }
 
 std::optional<Problem> expected(const Json& value, const ValueType& type) {
-  return Problem{"", fmt::format("{} is expected, not {}", element_text(type), shown_value(value))};
+  return Problem{"", fmt::format("{} is expected, not {}", element_text(type), shown(value))};
 }
 
 std::optional<Problem> choice_problem(const Json& value, const ValueType& type) {
-  if (!value.is_string()) return Problem{"", fmt::format("a string is expected, not {}", shown_value(value))};
+  if (!value.is_string()) return Problem{"", fmt::format("a string is expected, not {}", shown(value))};
   const std::string name = value.get<std::string>();
   std::vector<std::string_view> known(type.choices.begin(), type.choices.end());
   for (const auto& alias : type.aliases) known.push_back(alias.first);
   if (std::find(known.begin(), known.end(), name) != known.end()) return std::nullopt;
-  return Problem{
-      "", fmt::format("unknown value {}; accepted: {}{}", shown_value(value), choices_text(type), suggestion(name, known))};
+  return Problem{"", fmt::format("unknown value {}; accepted: {}{}", shown(value), choices_text(type), suggestion(name, known))};
 }
 
 std::optional<Problem> object_problem(const Json& value, const ValueType& type) {
@@ -196,19 +196,6 @@ std::string accepted_text(const ValueType& type) {
 
 int list_depth(const Json& json) { return !json.is_array() ? 0 : 1 + (json.empty() ? 0 : list_depth(json.front())); }
 
-std::string shown_value(const Json& json) {
-  constexpr std::size_t kMost = 60;
-  if (json.is_number_float()) return fmt::format("{}", json.get<double>());  // JSON has no name for NaN
-  std::string text = json.dump(-1, ' ', true, Json::error_handler_t::replace);
-  if (text.size() > kMost) text = text.substr(0, kMost - 3) + "...";
-  return text;
-}
-
-std::string shown_name(std::string_view name) {
-  const std::string text = shown_value(Json(name));
-  return text.ends_with('"') ? text.substr(1, text.size() - 2) : text.substr(1);
-}
-
 std::optional<Problem> value_problem(const Json& value, const ValueType& type) {
   if (value.is_null() && type.nullable) return std::nullopt;
   return type.depth > 0 ? list_problem(value, type, type.depth) : element_problem(value, type);
@@ -244,7 +231,7 @@ Json kept_members(Json value, const ValueType& type, const std::function<bool(co
 }
 
 void throw_problem(std::string_view what, std::string_view key, const Problem& problem) {
-  throw UsageError(fmt::format("{}{}'{}'{}: {}", what, what.empty() ? "" : ": ", key, problem.place, problem.text));
+  throw UsageError(fmt::format("{}{}'{}'{}: {}", what, what.empty() ? "" : ": ", key, clipped(problem.place), problem.text));
 }
 
 void require_keys(const Json& json, std::span<const Key* const> keys, std::string_view what) {
@@ -252,10 +239,10 @@ void require_keys(const Json& json, std::span<const Key* const> keys, std::strin
   for (const Key* key : keys) names.push_back(key->name);
   if (!json.is_object())
     throw UsageError(
-        fmt::format("{}: an object with the keys {} is expected, not {}", what, fmt::join(names, ", "), shown_value(json)));
+        fmt::format("{}: an object with the keys {} is expected, not {}", what, fmt::join(names, ", "), shown(json)));
   for (const auto& [key, value] : json.items())
     if (std::find(names.begin(), names.end(), key) == names.end())
-      throw UsageError(fmt::format("{}: unknown key '{}'; accepted: {}{}", what, shown_name(key), fmt::join(names, ", "),
+      throw UsageError(fmt::format("{}: unknown key '{}'; accepted: {}{}", what, clipped(key), fmt::join(names, ", "),
                                    suggestion(key, names)));
 }
 

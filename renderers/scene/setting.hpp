@@ -58,10 +58,6 @@ ValueType lists_of(ValueType element, std::size_t width, std::string form);
 std::string accepted_text(const ValueType& type);
 /// Lists around the first element.
 int list_depth(const Json& json);
-/// The text as JSON, cut where it is long.
-std::string shown_value(const Json& json);
-/// A name that somebody wrote, likewise, without quotes.
-std::string shown_name(std::string_view name);
 
 /// What is wrong with a value, and where in it: "[0][2]", ".radius", "" for the value itself.
 struct Problem {

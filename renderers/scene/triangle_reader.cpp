@@ -41,9 +41,12 @@ const Format& format_of(const fs::path& path) {
 }  // namespace
 
 TriangleMesh read_triangles(const fs::path& path) {
+  return read_triangles(path, path.has_parent_path() ? path.parent_path() : fs::path("."));
+}
+
+TriangleMesh read_triangles(const fs::path& path, const fs::path& folder) {
   const Format& format = format_of(path);
   const std::string bytes = load_bytes(path, kMostBytes);
-  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   try {
     return TriangleMesh(format.read({bytes, !leads_out_of(folder, path)}));
   } catch (const Error& e) {

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "structures/mesh/quoted.hpp"
 namespace amrtex {
 namespace {
 
@@ -23,7 +24,7 @@ std::string_view filtering_name(Filtering filtering) { return filtering == Filte
 Filtering parse_filtering(std::string_view name) {
   for (Filtering f : {Filtering::hardware, Filtering::manual})
     if (filtering_name(f) == name) return f;
-  throw UsageError(fmt::format("no filtering '{}'; accepted: hardware, manual", name));
+  throw UsageError(fmt::format("no filtering {}; accepted: hardware, manual", quote(name)));
 }
 
 StorageScale EncodedField::scale_of(int number) const {
@@ -83,7 +84,7 @@ HostTexture* EncodedField::find(std::string_view name) {
 const Encoding& find_encoding(std::string_view name) {
   for (const Encoding* e : all_encodings())
     if (e->name() == name) return *e;
-  throw UsageError(fmt::format("no encoding '{}'; accepted: {}", name,
+  throw UsageError(fmt::format("no encoding {}; accepted: {}", quote(name),
                                join_names(all_encodings(), [](const Encoding* e) { return e->name(); })));
 }
 
@@ -114,14 +115,14 @@ Json complete_parameters(const Encoding& encoding, const Json& given) {
   const std::vector<ParameterInfo> known = encoding.parameters();
   for (const auto& [key, value] : given.items())
     if (std::none_of(known.begin(), known.end(), [&](const ParameterInfo& p) { return p.name == key; }))
-      throw UsageError(fmt::format("encoding {}: no parameter '{}'; accepted: {}", encoding.name(), key,
+      throw UsageError(fmt::format("encoding {}: no parameter {}; accepted: {}", encoding.name(), quote(key),
                                    known.empty() ? "none" : join_names(known, [](const ParameterInfo& p) { return p.name; })));
   Json complete = Json::object();
   for (const ParameterInfo& p : known) {
     const Json& value = complete[p.name] = given.contains(p.name) ? given[p.name] : p.default_value;
     if (!p.accepted.has(value))
       throw UsageError(
-          fmt::format("encoding {}: parameter {} is {}; accepted: {}", encoding.name(), p.name, value.dump(), p.accepted.text()));
+          fmt::format("encoding {}: parameter {} is {}; accepted: {}", encoding.name(), p.name, shown(value), p.accepted.text()));
   }
   encoding.check_parameters(complete);
   return complete;
@@ -172,7 +173,7 @@ void require_fields(const Encoding& encoding, const AmrHierarchy& hierarchy, con
   for (int i = 0; i < request.field_count(); ++i)
     if (request.field_at(i) < 0 || request.field_at(i) >= known)
       throw UsageError(fmt::format("encoding {}: no field with index {}; {} has {}", encoding.name(), request.field_at(i),
-                                   hierarchy.name(), known));
+                                   clipped(hierarchy.name()), known));
 }
 
 }  // namespace amrtex

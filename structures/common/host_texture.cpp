@@ -8,6 +8,7 @@
 #include <glm/gtc/packing.hpp>
 
 #include "structures/mesh/error.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 namespace {
@@ -55,7 +56,7 @@ std::string_view format_name(TexelFormat format) { return info(format).name; }
 Storage parse_storage(std::string_view name) {
   for (Storage s : {Storage::r8, Storage::r16, Storage::r16f, Storage::r32f})
     if (format_name(s) == name) return s;
-  throw UsageError(fmt::format("no storage '{}'; accepted: r8, r16, r16f, r32f", name));
+  throw UsageError(fmt::format("no storage {}; accepted: r8, r16, r16f, r32f", quote(name)));
 }
 
 MemoryByRole& MemoryByRole::operator+=(const MemoryByRole& other) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "structures/common/build_tools.hpp"
 
@@ -11,15 +12,20 @@ namespace {
 
 double mebibytes(std::int64_t bytes) { return static_cast<double>(bytes) / 1048576.0; }
 
+/// Of a buffer: what the context takes, and as many elements as HostTexture::size counts.
+std::int64_t most_bytes(const Part& buffer, const ContextInfo& context) {
+  return std::min(context.max_buffer_bytes, std::int64_t{std::numeric_limits<int>::max()} * texel_bytes(buffer.format));
+}
+
 }  // namespace
 
 std::int64_t Part::texels() const {
-  return kind == HostTexture::Kind::buffer ? elements : std::int64_t{size.x} * size.y * size.z;
+  return kind == HostTexture::Kind::buffer ? elements : (CheckedSize(size.x) * size.y * size.z).or_most();
 }
 
 std::int64_t Part::bytes() const {
   const std::int64_t least = kind == HostTexture::Kind::buffer ? 1 : 0;
-  return std::max(texels(), least) * texel_bytes(format);
+  return (CheckedSize(std::max(texels(), least)) * texel_bytes(format)).or_most();
 }
 
 HostTexture Part::allocate() const {
@@ -68,7 +74,8 @@ Layout::Layout(const Encoding& encoding, const BuildRequest& request) : encoding
 
 void Layout::add(Part part) {
   if (!part.present && !part.why_absent.empty())
-    leave_out({part.what, part.why_absent, part.saved_bytes.value_or(part.texels() * texel_bytes(part.format)), part.need});
+    leave_out({part.what, part.why_absent,
+               part.saved_bytes.value_or((CheckedSize(part.texels()) * texel_bytes(part.format)).or_most()), part.need});
   parts_.push_back(std::move(part));
 }
 
@@ -82,12 +89,12 @@ Part Layout::values(std::string_view name, int number, const Vec3i& size) const 
 Part Layout::more_ranges(std::string name, std::int64_t regions) const {
   const int others = request_.field_count() - 1;
   return buffer_part(std::move(name), "value ranges of further fields", TexelFormat::r32ui,
-                     std::max<std::int64_t>(regions, 1) * others)
+                     (CheckedSize(std::max<std::int64_t>(regions, 1)) * others).or_most())
       .when(request_.needs.field_ranges && others > 0);
 }
 
 std::int64_t Layout::value_bytes(std::int64_t values) const {
-  return values * request_.field_count() * texel_bytes(request_.storage);
+  return (CheckedSize(values) * request_.field_count() * texel_bytes(request_.storage)).or_most();
 }
 
 void Layout::leave_out(const LeftOut& entry) {
@@ -95,20 +102,20 @@ void Layout::leave_out(const LeftOut& entry) {
   if (known == left_out_.end())
     left_out_.push_back(entry);
   else
-    known->bytes += entry.bytes;
+    known->bytes = (CheckedSize(known->bytes) + entry.bytes).or_most();
 }
 
 std::int64_t Layout::bytes() const {
-  std::int64_t all = 0;
+  CheckedSize all;
   for (const Part& p : parts_)
     if (p.present) all += p.bytes();
-  return all;
+  return all.or_most();
 }
 
 void Layout::require_limits() const {
   const ContextInfo& context = request_.context;
   const auto passes = [&](const Part& p) {
-    if (p.kind == HostTexture::Kind::buffer) return p.bytes() > context.max_buffer_bytes;
+    if (p.kind == HostTexture::Kind::buffer) return p.bytes() > most_bytes(p, context);
     return std::max({p.size.x, p.size.y, p.size.z}) > context.max_3d_texture_size;
   };
   const Part* worst = nullptr;
@@ -117,7 +124,7 @@ void Layout::require_limits() const {
   if (worst == nullptr) return;
   const std::string sizes =
       worst->kind == HostTexture::Kind::buffer
-          ? fmt::format("{} bytes; accepted by this context: a buffer of at most {}", worst->bytes(), context.max_buffer_bytes)
+          ? fmt::format("{} bytes; accepted by this context: a buffer of at most {}", worst->bytes(), most_bytes(*worst, context))
           : fmt::format("{} x {} x {} texels; accepted by this context: a 3D texture of at most {} along an axis", worst->size.x,
                         worst->size.y, worst->size.z, context.max_3d_texture_size);
   throw UnsupportedError(
@@ -142,7 +149,7 @@ void Layout::allocate(EncodedField& field) const {
   field.left_out = left_out_;
   for (const Part& p : parts_)
     if (p.present) field.textures.push_back(p.allocate());
-  field.host_peak_bytes = bytes() + working_;
+  field.host_peak_bytes = (CheckedSize(bytes()) + working_).or_most();
 }
 
 void set_draw_tree(EncodedField& field, DrawTree tree) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "structures/common/encoding.hpp"
+#include "structures/mesh/checked.hpp"
 
 namespace amrtex {
 
@@ -45,7 +46,7 @@ class Layout {
   const BuildRequest& request_;
   std::vector<Part> parts_;
   std::vector<LeftOut> left_out_;
-  std::int64_t working_ = 0;
+  CheckedSize working_;
   std::string remedy_;
 };
 

@@ -96,6 +96,7 @@ std::string quote(std::string_view text) { return "'" + clipped(text) + "'"; }
 
 std::string shown(const Json& value) {
   if (value.is_string()) return "\"" + clipped(value.get_ref<const std::string&>()) + "\"";
+  if (value.is_number_float()) return fmt::format("{}", value.get<double>());  // JSON has no name for NaN
   return clipped(value.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 

@@ -13,6 +13,7 @@
 #include "octree_writer.hpp"
 #include "structures/common/build_tools.hpp"
 #include "structures/common/layout.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 namespace {
@@ -31,10 +32,11 @@ void require_shared_tree(const AmrHierarchy& h, const BuildRequest& request, con
         "encoding octree: layout rgba8 has room for one sample in a leaf; accepted: layout wide, or one field");
   for (int i = 0; i < request.field_count(); ++i)
     if (h.statistics(request.field_at(i)).cells_without_value > 0)
-      throw UnsupportedError(fmt::format(
-          "encoding octree: field {} has {} cells without a value, and the tree of several fields has one shape; "
-          "accepted: fields that have a value in every cell, or one field",
-          h.fields()[static_cast<std::size_t>(request.field_at(i))], h.statistics(request.field_at(i)).cells_without_value));
+      throw UnsupportedError(
+          fmt::format("encoding octree: field {} has {} cells without a value, and the tree of several fields has one shape; "
+                      "accepted: fields that have a value in every cell, or one field",
+                      clipped(h.fields()[static_cast<std::size_t>(request.field_at(i))]),
+                      h.statistics(request.field_at(i)).cells_without_value));
 }
 
 /// Nodes may go where only the volume is drawn, by its own filter.

@@ -5,6 +5,7 @@
 
 #include "renderers/reference/filters/dual_cells.hpp"
 #include "structures/mesh/error.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 namespace {
@@ -29,8 +30,8 @@ Pages::Pages(const AmrHierarchy& hierarchy, const FilterDefinition& definition) 
   const int levels = hierarchy.level_count();
   if (definition.page_size < 0) throw Error(fmt::format("page_size {}: must not be negative", definition.page_size));
   if (definition.page_size == 0 && (definition.page_level < 0 || definition.page_level >= levels))
-    throw Error(
-        fmt::format("page level {}: data set {} has levels 0 to {}", definition.page_level, hierarchy.name(), levels - 1));
+    throw Error(fmt::format("page level {}: data set {} has levels 0 to {}", definition.page_level, clipped(hierarchy.name()),
+                            levels - 1));
   split_.resize(static_cast<std::size_t>(levels));
   for (int level = 0; definition.page_size > 0 && level < levels; ++level) split(level);
 }
