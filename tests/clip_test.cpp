@@ -93,15 +93,18 @@ TEST(Clip, ByObliquePlanesLeavesTheChordBetweenThem) {
   const AmrHierarchy h = nested(constant(1)).hierarchy();
   const double k = 3;
   const std::vector<ClipPlane> planes{kOblique, {{-1, 0.2, 0.3}, -0.5}, {{0, 0, 7}, 0.7}};
+  const GlPairs on_gl(2), by_box(2, [&](const EncodingCase&c) { return gives_boxes(h, c); });
   for_each_filter([&](const EncodingCase& c) {
     const EncodedField field = build(h, c);
     for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive}) {
       Scene scene = clip_scene(Mode::dvr, sampling, planes);
       scene.transfer_function = constant_light(k);
       EXPECT_LE(off_closed_form(render_on_cpu(h, field, scene, true), scene, k), 1e-12);
-      EXPECT_LE(off_closed_form(draw(context(ContextKind::egl), h, field, scene), scene, k), 3e-6);
+      if (on_gl.has(c)) {
+        EXPECT_LE(off_closed_form(draw(context(ContextKind::egl), h, field, scene), scene, k), 3e-6);
+      }
       EXPECT_GT(kept_chord(scene, 4, 4), 0.1);
-      if (!gives_boxes(h, c)) continue;
+      if (!by_box.has(c)) continue;
       scene.settings.consumer = ConsumerKind::multipass;
       EXPECT_LE(off_closed_form(draw_boxes(h, c, scene), scene, k), 3e-6);
       // slices: half a distance at each end of the ray
@@ -118,8 +121,7 @@ TEST(Clip, ByObliquePlanesLeavesTheChordBetweenThem) {
 TEST(Clip, BoxByBoxIsTheRaycastersPicture) {
   const AmrHierarchy h = nested(waves).hierarchy();
   int drawn = 0;
-  for_each_filter([&](const EncodingCase& c) {
-    if (!gives_boxes(h, c) || c.filter == Filter::nearest) return;
+  GlPairs(2, [&](const EncodingCase& c) { return interpolating(c) && gives_boxes(h, c); }).for_each([&](const EncodingCase& c) {
     for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive}) {
       Scene scene = clip_scene(Mode::dvr, sampling, {kOblique});
       scene.transfer_function = peaks();
@@ -130,7 +132,7 @@ TEST(Clip, BoxByBoxIsTheRaycastersPicture) {
       ++drawn;
     }
   });
-  EXPECT_GE(drawn, 6);
+  EXPECT_GE(drawn, 4);
 }
 
 TEST(Clip, CutsInEveryIntegrator) {
@@ -162,6 +164,7 @@ constexpr std::array kModes{Mode::dvr, Mode::projection, Mode::mip, Mode::iso, M
 
 TEST(Clip, ByAPlaneThroughNothingChangesNoBit) {
   const AmrHierarchy h = nested(waves).hierarchy();
+  const GlPairs on_gl(2);
   for_each_filter([&](const EncodingCase& c) {
     const EncodedField field = build(h, c);
     for (const Mode mode : kModes)
@@ -169,8 +172,7 @@ TEST(Clip, ByAPlaneThroughNothingChangesNoBit) {
         Scene scene = clip_scene(mode, sampling, {});
         make_surfaces(scene);
         const Picture whole = render_on_cpu(h, field, scene, false);
-        const bool drawn =
-            mode == Mode::dvr && sampling == Sampling::lattice;  // compiling shaders is what this takes its time for
+        const bool drawn = mode == Mode::dvr && sampling == Sampling::lattice && on_gl.has(c);
         const Picture on_gl = drawn ? draw(context(ContextKind::egl), h, field, scene) : Picture();
         scene.settings.clip_planes = {{{0.3, 1, 0.2}, -4}, {{0, -2, 0}, -2.5}};
         EXPECT_EQ(render_on_cpu(h, field, scene, false).values, whole.values);

@@ -36,7 +36,7 @@ double along_x(const Vec3d& p) { return p.x; }
 
 EncodedField in_double(const AmrHierarchy& h, const EncodingCase& c) { return build(h, c, {.storage = Storage::r64f}); }
 
-bool holds_linear(Filter filter) { return filter != Filter::nearest; }
+bool is_nearest(const EncodingCase& c) { return c.filter == Filter::nearest; }
 
 /// A case may refuse what the test is about (a storage, a mesh); the others are drawn.
 template <class F>
@@ -59,7 +59,7 @@ TEST(Hit, OfALinearFieldLiesInThePlane) {
   const AmrHierarchy h = MeshBuilder(Vec3i(16)).root(along_x).hierarchy();
   const View view = orthographic(Vec3d(0.5), {1, 0.3, -0.2}, 0.5);
   for_each_accepted([&](const EncodingCase& c) {
-    if (!holds_linear(c.filter)) return;
+    if (!interpolating(c)) return;
     const EncodedField doubles = in_double(h, c);
     for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive}) {
       const Scene depth = iso_scene(view, {0.5}, Output::depth, sampling);
@@ -82,16 +82,20 @@ TEST(Hit, OfNearestLiesOnTheFaceBetweenTwoSides) {
   // leaves of x < 1/2 are 0, the others 1; the face is one of cells, and of levels
   const auto sides = [](const Vec3d& p) { return p.x < 0.5 ? 0.0 : 1.0; };
   const AmrHierarchy h = MeshBuilder(Vec3i(8), {2}).root(sides).patch(1, {{8, 0, 0}, {16, 16, 16}}, sides).hierarchy();
+  const GlPairs on_gl(2, is_nearest);
   for_each_accepted([&](const EncodingCase& c) {
-    if (c.filter != Filter::nearest) return;
+    if (!is_nearest(c)) return;
     Scene scene = iso_scene(orthographic(Vec3d(0.5), {1, 0.3, -0.2}, 0.5), {0.5}, Output::depth);
     scene.settings.isosurfaces.tolerance = 1.0 / 512;  // finest cells, 1/16 wide
-    const Picture depths = draw(context(ContextKind::egl), h, build(h, c), scene);
-    for (int y = 0; y < kSize; ++y)
-      for (int x = 0; x < kSize; ++x) {
-        const WorldRay ray = ray_of(scene, x, y);
-        ASSERT_NEAR(*depths.pixel(x, y), (0.5 - ray.origin.x) / ray.direction.x, 1.0 / 512 / 16 + 1e-6);
-      }
+    const EncodedField field = build(h, c);
+    std::vector<Picture> pictures{render_on_cpu(h, field, scene, false)};
+    if (on_gl.has(c)) pictures.push_back(draw(context(ContextKind::egl), h, field, scene));
+    for (const Picture& depths : pictures)
+      for (int y = 0; y < kSize; ++y)
+        for (int x = 0; x < kSize; ++x) {
+          const WorldRay ray = ray_of(scene, x, y);
+          ASSERT_NEAR(*depths.pixel(x, y), (0.5 - ray.origin.x) / ray.direction.x, 1.0 / 512 / 16 + 1e-6);
+        }
   });
 }
 
@@ -120,9 +124,9 @@ TEST(Hit, IsNotWhereARayEntersOrLeavesTheMesh) {
 
 TEST(Hit, IsNotWhereNoIsovalueIsReached) {
   const AmrHierarchy h = nested(waves).hierarchy();
-  for_each_filter([&](const EncodingCase& c) {
+  GlPairs(1).for_each_and_on_cpu([&](const EncodingCase& c, bool gl) {
     const Scene scene = iso_scene(perspective({2, -1.5, 1.2}, Vec3d(0.5)), {-3, 7});
-    EXPECT_EQ(largest(draw(context(ContextKind::egl), h, build(h, c), scene)), 0);
+    EXPECT_EQ(largest(draw_on(gl, h, build(h, c), scene)), 0);
   });
 }
 
@@ -132,7 +136,7 @@ TEST(Surfaces, OneBehindAnotherAddUpInOrder) {
   // a1 c1 + (1 - a1) a2 c2, whichever side the ray comes from; surfaces of one interval too
   const AmrHierarchy h = MeshBuilder(Vec3i(16)).root(along_x).hierarchy();
   for_each_accepted([&](const EncodingCase& c) {
-    if (!holds_linear(c.filter)) return;
+    if (!interpolating(c)) return;
     const EncodedField field = in_double(h, c);
     for (const double direction : {1.0, -1.0})
       for (const double distance : {0.25, 0.01})
@@ -158,7 +162,7 @@ TEST(Surfaces, InAVolumeSplitItWhereTheyLie) {
   const AmrHierarchy h = MeshBuilder(Vec3i(16)).root(along_x).hierarchy();
   const double k = 3;
   for_each_accepted([&](const EncodingCase& c) {
-    if (!holds_linear(c.filter)) return;
+    if (!interpolating(c)) return;
     const EncodedField field = in_double(h, c);
     for (const double a : {0.5, 1.0})
       for (const double isovalue : {0.5, 0.52, 0.541})
@@ -182,8 +186,7 @@ TEST(Surfaces, InAVolumeSplitItWhereTheyLie) {
 TEST(Surfaces, OfGlAreThoseOfTheDoubleBuild) {
   // depth, and light in a volume, of a linear field: no silhouettes, so every pixel agrees
   const AmrHierarchy h = MeshBuilder(Vec3i(16)).root(along_x).hierarchy();
-  for_each_filter([&](const EncodingCase& c) {
-    if (!holds_linear(c.filter)) return;
+  GlPairs(2, interpolating).for_each([&](const EncodingCase& c) {
     const EncodedField doubles = build(h, c, {.storage = Storage::r64f});
     const EncodedField floats = build(h, c);
     for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive}) {
@@ -203,7 +206,7 @@ TEST(Surfaces, AreLitByTheAngleBetweenTheirGradientAndTheRay) {
   const AmrHierarchy h = MeshBuilder(Vec3i(16), {}, {0, 0, 0}, {1, 2, 4}).root(along_x).hierarchy();
   const Vec3d direction = glm::normalize(Vec3d(1, 0.8, -0.5));
   for_each_accepted([&](const EncodingCase& c) {
-    if (!holds_linear(c.filter)) return;
+    if (!interpolating(c)) return;
     Scene scene = iso_scene(orthographic({0.5, 1, 2}, direction, 0.3), {0.5});
     scene.settings.isosurfaces.color = {{0, Vec3d(1)}};
     const Picture picture = render_on_cpu(h, in_double(h, c), scene, true);
@@ -223,16 +226,18 @@ TEST(Surfaces, TakeTheColorOfASecondField) {
   scene.settings.isosurfaces.shading = Shading::none;
   scene.settings.isosurfaces.color_field = "g";
   scene.settings.isosurfaces.color = {{0, {0, 0, 1}}, {1, {1, 0, 0}}};
+  const GlPairs on_gl(2, interpolating);
   for_each_filter([&](const EncodingCase& c) {
-    if (!holds_linear(c.filter)) return;
+    if (!interpolating(c)) return;
     BuildRequest request;
     request.more_fields = {1};
     request.needs.filter = c.filter;
     request.parameters = c.parameters;
     const EncodedField field = c.encoding->build(h, request);
-    const Picture reference = HierarchyReference(h, 0, field.definition).render(scene, 0.1);
-    for (const Picture& picture :
-         {render_on_cpu(h, field, scene, true), draw(context(ContextKind::egl), h, field, scene), reference})
+    std::vector<Picture> pictures{render_on_cpu(h, field, scene, true),
+                                  HierarchyReference(h, 0, field.definition).render(scene, 0.1)};
+    if (on_gl.has(c)) pictures.push_back(draw(context(ContextKind::egl), h, field, scene));
+    for (const Picture& picture : pictures)
       for (int y = 0; y < kSize; ++y)
         for (int x = 0; x < kSize; ++x) {
           const WorldRay ray = ray_of(scene, x, y);
@@ -240,7 +245,7 @@ TEST(Surfaces, TakeTheColorOfASecondField) {
           ASSERT_NEAR(picture.pixel(x, y)[0], g, 1e-5);
           ASSERT_NEAR(picture.pixel(x, y)[2], 1 - g, 1e-5);
         }
-    EXPECT_THROW(draw(context(ContextKind::egl), h, build(h, c), scene), Error) << "it was built without the second field";
+    EXPECT_THROW(render_on_cpu(h, build(h, c), scene, true), Error) << "it was built without the second field";
   });
 }
 
@@ -279,7 +284,9 @@ TEST(Surfaces, AreLitByStoredGradientsWhereThereAreAny) {
                                  [](const auto& d) { return d.first.ends_with("_GRADIENTS") && d.second != 0; });
     if (!has) continue;
     ++stored;
-    for (const Picture& picture : {draw(context(ContextKind::egl), h, field, scene), render_on_cpu(h, field, scene, true)})
+    std::vector<Picture> pictures{render_on_cpu(h, field, scene, true)};
+    if (stored == 1 || full_tier()) pictures.push_back(draw(context(ContextKind::egl), h, field, scene));
+    for (const Picture& picture : pictures)
       for (int y = 0; y < kSize; ++y)
         for (int x = 0; x < kSize; ++x) {
           const WorldRay ray = ray_of(scene, x, y);
@@ -376,7 +383,7 @@ TEST(Convergence, OfPositionsHasOrderTwoAndOfNormalsOneAtLeast) {
     for (const int n : {24, 48, 96}) {
       const AmrHierarchy h = MeshBuilder(Vec3i(n)).root(body.f).hierarchy();
       for_each_filter([&](const EncodingCase& c) {
-        if (!holds_linear(c.filter)) return;
+        if (!interpolating(c)) return;
         errors[c.name()].push_back(surface_errors(body, h, in_double(h, c), view));
       });
     }
@@ -454,8 +461,9 @@ TEST(Skipping, LeavesSurfacesAsTheyAre) {
 }
 
 TEST(Skipping, LeavesSurfacesAsTheyAreOnGl) {
+  // of one pair: every case and mesh above, and this is the dearest of all shaders
   const AmrHierarchy h = holes_and_missing(waves).hierarchy();
-  for_each_encoding([&](const EncodingCase& c) {
+  GlPairs(1).for_each([&](const EncodingCase& c) {
     const EncodedField field = build(h, c);
     WorkCounts all_work;
     WorkCounts skipped_work;
@@ -470,22 +478,26 @@ TEST(Skipping, LeavesSurfacesAsTheyAreOnGl) {
 
 TEST(Nearest, SurfacesAreTheSameToTheBitInEveryEncoding) {
   const AmrHierarchy h = nested(waves).hierarchy();
-  std::map<std::string, Picture> pictures;
+  const Scene scene = rich_scene(Mode::dvr_iso, Sampling::lattice, true);
+  const GlPairs on_gl(2, is_nearest);
+  std::map<std::string, Picture> on_cpu, drawn;
   for_each_case([&](const EncodingCase& c) {
-    if (c.filter != Filter::nearest) return;
+    if (!is_nearest(c)) return;
     const EncodedField field = build(h, c);
     if (field.definition.filter != Filter::nearest) return;
-    pictures.emplace(c.name(), draw(context(ContextKind::egl), h, field, rich_scene(Mode::dvr_iso, Sampling::lattice, true)));
+    on_cpu.emplace(c.name(), render_on_cpu(h, field, scene, false));
+    if (on_gl.has(c)) drawn.emplace(c.name(), draw(context(ContextKind::egl), h, field, scene));
   });
-  ASSERT_GT(pictures.size(), 1u);
-  for (const auto& [name, picture] : pictures) EXPECT_EQ(difference(picture, pictures.begin()->second), 0) << name;
-  EXPECT_GT(largest(pictures.begin()->second), 0.1);
+  for (const auto& pictures : {on_cpu, drawn}) {
+    ASSERT_GT(pictures.size(), 1u);
+    for (const auto& [name, picture] : pictures) EXPECT_EQ(difference(picture, pictures.begin()->second), 0) << name;
+    EXPECT_GT(largest(pictures.begin()->second), 0.1);
+  }
 }
 
 TEST(Contexts, AndTheCpuDrawTheSameSurfaces) {
   const AmrHierarchy h = nested(waves).hierarchy();
-  for_each_filter([&](const EncodingCase& c) {
-    if (!holds_linear(c.filter)) return;
+  GlPairs(2, interpolating).for_each([&](const EncodingCase& c) {
     const Scene scene = rich_scene(Mode::dvr_iso, Sampling::lattice, true);
     const EncodedField field = build(h, c);
     const Picture cpu = render_on_cpu(h, field, scene, false);
@@ -498,7 +510,7 @@ TEST(Contexts, AndTheCpuDrawTheSameSurfaces) {
 
 TEST(Needs, ScenesWithoutSurfacesHaveNoCodeForThem) {
   const AmrHierarchy h = nested(waves).hierarchy();
-  for_each_filter([&](const EncodingCase& c) {
+  GlPairs(2).for_each([&](const EncodingCase& c) {
     Context& gl = context(ContextKind::egl);
     const EncodedField field = build(h, c);
     const Structure structure(gl, field);

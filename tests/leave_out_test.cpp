@@ -56,6 +56,15 @@ std::vector<EncodingCase> cases_of(const Encoding& encoding, Filter filter) {
   return cases;
 }
 
+/// Nothing where the encoding refuses.
+std::vector<LeftOut> left_out_of(const EncodingCase& c, const BuildOptions& options) {
+  try {
+    return build(blobs(), c, options).left_out;
+  } catch (const UnsupportedError&) {
+    return {};
+  }
+}
+
 /// What any encoding leaves out under any filter, each with the first build that does. Some parts belong to a layout of 8-bit
 /// samples.
 const std::vector<Absence>& absences() {
@@ -66,13 +75,11 @@ const std::vector<Absence>& absences() {
       for (const Filter filter : encoding->filters())
         for (const EncodingCase& c : cases_of(*encoding, filter))
           for (const BuildOptions& options :
-               {BuildOptions{}, BuildOptions{.value_ranges = false}, BuildOptions{.storage = Storage::r8}}) {
-            if (!accepted(blobs(), c, options)) continue;
-            for (const LeftOut& entry : build(blobs(), c, options).left_out)
+               {BuildOptions{}, BuildOptions{.value_ranges = false}, BuildOptions{.storage = Storage::r8}})
+            for (const LeftOut& entry : left_out_of(c, options))
               if (entry.need != Need::none &&
                   known.insert(fmt::format("{} {} {}", encoding->name(), filter_name(filter), entry.what)).second)
                 found.push_back({c, build_request(c, options), entry});
-          }
     return found;
   }();
   return all;
@@ -150,9 +157,10 @@ Picture picture_of(const EncodedField& field, const Scene& scene, bool on_gl) {
 }
 
 TEST(LeaveOut, APartThatIsNotNeededDoesNotChangeThePicture) {
-  std::set<std::string> drawn;  // on the context once an encoding and part
+  std::set<std::string> drawn;  // on the context a part once, of the first encoding that has it; in the full tier of each
   for_each_absence([&](const Absence& a) {
-    const bool on_gl = drawn.insert(fmt::format("{} {}", a.c.encoding->name(), a.entry.what)).second;
+    const std::string part = full_tier() ? fmt::format("{} {}", a.c.encoding->name(), a.entry.what) : a.entry.what;
+    const bool on_gl = drawn.insert(part).second;
     const auto picture = [&](const BuildRequest& request) {
       // regions may differ, and with them places of adaptive
       return picture_of(a.built(request), volume(Sampling::lattice, request.needs.value_ranges), on_gl);
@@ -297,7 +305,7 @@ TEST(LeaveOut, ScenesWithoutIsovaluesBindNothingOfSurfaces) {
 TEST(LeaveOut, EveryTextureOfAStructureIsReadByItsPicture) {
   const AmrHierarchy h = nested(waves).hierarchy();
   Context& gl = context(ContextKind::egl);
-  for_each_filter([&](const EncodingCase& c) {
+  GlPairs(all_encodings().size()).for_each([&](const EncodingCase& c) {
     for (const bool skip : {true, false}) {
       const EncodedField field = build(h, c, {.value_ranges = skip});
       const Structure structure(gl, field);
@@ -322,18 +330,12 @@ TEST(Hidden, IsARangeThatLiesInOneIntervalWithoutExtinction) {
   EXPECT_FALSE(is_hidden({3.5, 4}));
 }
 
-template <class F>
-void for_each_pruning_case(F&& f) {
-  for_each_filter([&](const EncodingCase& c) {
-    if (c.encoding->prunes()) f(c);
-  });
-}
+bool prunes(const EncodingCase& c) { return c.encoding->prunes(); }
 
 // Where a ray enters a region that can be seen does not depend on regions before it; what is hidden adds nothing. With hardware
 // filtering the pool's size enters the normalised coordinate: that is not the same to the bit.
 TEST(Prune, LeavesThePictureTheSameToTheBit) {
-  Context& gl = context(ContextKind::egl);
-  for_each_pruning_case([&](const EncodingCase& c) {
+  GlPairs(2, prunes).for_each_and_on_cpu([&](const EncodingCase& c, bool gl) {
     const AmrHierarchy& h = pruned_mesh(c);
     const EncodedField whole = build(h, c);
     const EncodedField pruned = build(h, c, {.invisible = invisible_of(volume())});
@@ -341,9 +343,9 @@ TEST(Prune, LeavesThePictureTheSameToTheBit) {
       for (const bool skip : {true, false}) {
         SCOPED_TRACE(fmt::format("{} skip {}", sampling_name(sampling), skip));
         const Scene scene = volume(sampling, skip);
-        const Picture picture = draw(gl, h, whole, scene);
+        const Picture picture = draw_on(gl, h, whole, scene);
         EXPECT_GT(largest(picture), 0.1);
-        EXPECT_EQ(difference(picture, draw(gl, h, pruned, scene)), 0);
+        EXPECT_EQ(difference(picture, draw_on(gl, h, pruned, scene)), 0);
       }
   });
 }
@@ -351,7 +353,8 @@ TEST(Prune, LeavesThePictureTheSameToTheBit) {
 TEST(Prune, TakesNoMoreStepsThroughWhatIsHidden) {
   Context& gl = context(ContextKind::egl);
   const Scene scene = volume(Sampling::adaptive);
-  for_each_pruning_case([&](const EncodingCase& c) {
+  // the tests of encodings count with each of their filters
+  GlPairs(2, prunes).for_each([&](const EncodingCase& c) {
     WorkCounts all, left;
     const AmrHierarchy& h = pruned_mesh(c);
     draw(gl, h, build(h, c), scene, &all);
@@ -365,9 +368,9 @@ TEST(Prune, TakesNoMoreStepsThroughWhatIsHidden) {
 TEST(Prune, LeavesATreeWithoutDataWhereNothingCanBeSeen) {
   Scene scene = volume();
   scene.transfer_function.extinction = {{100, 0}, {101, 5}};  // above all values
-  for_each_pruning_case([&](const EncodingCase& c) {
+  GlPairs(1, prunes).for_each_and_on_cpu([&](const EncodingCase& c, bool gl) {
     const EncodedField pruned = build(blobs(), c, {.invisible = invisible_of(scene)});
-    EXPECT_EQ(largest(draw(context(ContextKind::egl), blobs(), pruned, scene)), 0);
+    EXPECT_EQ(largest(draw_on(gl, blobs(), pruned, scene)), 0);
     EXPECT_LT(value_bytes(pruned), 1 << 16);
   });
 }

@@ -415,8 +415,7 @@ TEST(LevelOfDetail, ErrorFallsWithTheThresholdToNothing) {
 TEST(LevelOfDetail, TheContextDrawsWhatTheTextComputesWithFewerSamples) {
   const AmrHierarchy h = three_levels();
   Context& gl = context(ContextKind::egl);
-  for (const EncodingCase& c : cases()) {
-    SCOPED_TRACE(c.name());
+  GlPairs(2, [&](const EncodingCase& c) { return takes(h, c); }).for_each([&](const EncodingCase& c) {
     const EncodedField field = build(h, c, {.level_of_detail = true});
     WorkCounts coarse, fine;
     const Scene pruned = scene_of(h, 4.0);
@@ -428,7 +427,7 @@ TEST(LevelOfDetail, TheContextDrawsWhatTheTextComputesWithFewerSamples) {
     const Picture whole = draw(gl, h, field, scene_of(h, kNoThreshold), &fine);
     EXPECT_LT(coarse.samples, fine.samples);
     EXPECT_EQ(whole.values, draw(gl, h, build(h, c), scene_of(h, std::nullopt)).values) << "off and a threshold of nothing";
-  }
+  });
 }
 
 // ---- records and refusals

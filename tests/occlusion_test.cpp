@@ -164,7 +164,7 @@ TEST(Occlusion, ConvergesToTheReferenceInEveryFilter) {
 
 TEST(Occlusion, IsTheSameOnGl) {
   const AmrHierarchy h = nested(waves).hierarchy();
-  for_each_encoding([&](const EncodingCase& c) {
+  GlPairs(1).for_each([&](const EncodingCase& c) {
     const EncodedField field = build(h, c);
     const Scene scene = wave_scene(Mode::iso, 0.3, 16);
     const Picture on_gl = draw(context(ContextKind::egl), h, field, scene);

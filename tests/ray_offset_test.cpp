@@ -53,8 +53,9 @@ TEST(RayOffset, LosesNoLengthOfARay) {
 }
 
 TEST(RayOffset, IsTheSameNumberInDoubleAndOnGl) {
+  // the number is computed before the encoding's text is entered
   const AmrHierarchy h = nested(waves).hierarchy();
-  for_each_filter([&](const EncodingCase& c) {
+  GlPairs(2).for_each([&](const EncodingCase& c) {
     const EncodedField field = build(h, c);
     for (const Sampling sampling : kSamplings) {
       const Scene scene = offset_scene(Mode::projection, sampling, 3);
@@ -94,14 +95,11 @@ TEST(RayOffset, IsTheSameBoxByBox) {
   const AmrHierarchy h = nested(waves).hierarchy();
   Context& gl = context(ContextKind::egl);
   int drawn = 0;
-  for_each_filter([&](const EncodingCase& c) {
-    EncodedField field;
-    try {
-      field = build(h, c, {.draw_boxes = true});
-    } catch (const UnsupportedError&) {
-      return;
-    }
-    if (field.draw_tree.empty() || c.filter == Filter::nearest) return;
+  const auto gives_boxes = [&](const EncodingCase& c) {
+    return interpolating(c) && accepted(h, c, {.draw_boxes = true}) && !build(h, c, {.draw_boxes = true}).draw_tree.empty();
+  };
+  GlPairs(2, gives_boxes).for_each([&](const EncodingCase& c) {
+    const EncodedField field = build(h, c, {.draw_boxes = true});
     for (const Sampling sampling : kSamplings) {
       Scene scene = offset_scene(Mode::dvr, sampling, 5);
       const Picture by_ray = draw(gl, h, field, scene);

@@ -368,6 +368,7 @@ TEST(Triangles, InAConstantMediumFollowBeerAndLambert) {
   const AmrHierarchy h = nested(constant(1)).hierarchy();
   const Vec3d at(0.5, 0.45, 0.55);
   const Vec3d normal(2, -1, 0.5);
+  const GlPairs on_gl(2);
   for_each_filter([&](const EncodingCase& c) {
     const EncodedField field = build(h, c);
     for (const Sampling sampling : kSamplings)
@@ -381,7 +382,9 @@ TEST(Triangles, InAConstantMediumFollowBeerAndLambert) {
     Scene scene = triangle_scene(Mode::dvr, Sampling::lattice, {object(square(at, normal))}, oblique());
     scene.transfer_function = constant_light(1.5);
     EXPECT_LE(off_beer_lambert(HierarchyReference(h, 0, field.definition).render(scene, 0.5), scene, 1.5, at, normal), 1e-12);
-    EXPECT_LE(off_beer_lambert(draw(context(ContextKind::egl), h, field, scene), scene, 1.5, at, normal), 1e-5);
+    if (on_gl.has(c)) {
+      EXPECT_LE(off_beer_lambert(draw(context(ContextKind::egl), h, field, scene), scene, 1.5, at, normal), 1e-5);
+    }
   });
 }
 
@@ -550,13 +553,12 @@ TEST(Triangles, ConvergeToTheReferenceInEveryModeAndFilter) {
 }
 
 TEST(Triangles, AreTheSameOnGl) {
+  // each mode with another encoding; dvr has its closed form above
   const AmrHierarchy h = nested(waves).hierarchy();
-  std::set<const Encoding*> drawn;
-  for_each_filter([&](const EncodingCase& c) {
+  GlPairs(2).for_each([&](const EncodingCase& c, std::size_t pair) {
     const EncodedField field = build(h, c);
-    // surfaces with one filter of each encoding: compiling them takes its time; dvr has its closed form above
     for (const Mode mode : {Mode::projection, Mode::dvr_iso}) {
-      if (mode == Mode::dvr_iso && !drawn.insert(c.encoding).second) continue;
+      if (!in_turn(mode == Mode::projection ? 0 : 1, pair, 2)) continue;
       const Scene scene = triangle_scene(mode, Sampling::adaptive, {object(tetrahedron())}, oblique());
       EXPECT_LE(rms_difference(draw(context(ContextKind::egl), h, field, scene), render_on_cpu(h, field, scene, true)),
                 c.filter == Filter::nearest || mode == Mode::dvr_iso ? 2e-2 : 1e-4);

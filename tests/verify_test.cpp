@@ -9,6 +9,8 @@
 #include <set>
 #include <vector>
 
+#include "tests/test_tier.hpp"
+
 namespace amrtex::verify {
 namespace {
 
@@ -100,9 +102,9 @@ TEST(Verify, EveryEncodingAndFilterTakesPart) {
 }
 
 /// What all suites would ask, without asking it.
-Report listed() {
+Report listed(std::size_t one_in = 1) {
   Report report;
-  VerifyContext context({.list = true}, report);
+  VerifyContext context({.list = true, .one_in = one_in}, report);
   for (const Suite& s : suites()) {
     context.begin(std::string(s.name));
     s.run(context);
@@ -131,6 +133,27 @@ TEST(Verify, EachNumberOfTheListIsAskedOfEveryEncodingAndFilter) {
         EXPECT_TRUE(asked[number].contains(fmt::format("{} {}", e->name(), filter_name(filter))))
             << number << " " << e->name() << " " << filter_name(filter);
   }
+}
+
+// What the default tier of the tests runs (verify_suite.sh): whatever is asked, it is asked of somebody, and everybody is asked.
+TEST(Verify, OneInFourIsASampleOfEveryNumberAndOfEveryEncodingAndFilter) {
+  std::set<int> numbers;
+  std::set<std::string> pairs;
+  std::size_t asked = 0, all = 0;
+  for (const Skipped& s : listed(4).skipped) {
+    if (s.encoding.empty()) continue;
+    ++all;
+    if (s.reason != "listed") continue;
+    ++asked;
+    numbers.insert(list_number(s.name));
+    pairs.insert(s.encoding + " " + s.filter);
+  }
+  EXPECT_EQ(numbers.size(), static_cast<std::size_t>(kListed - 1)) << "27 is of files";
+  for (const Encoding* e : all_encodings())
+    for (const Filter filter : e->filters())
+      EXPECT_TRUE(pairs.contains(fmt::format("{} {}", e->name(), filter_name(filter))))
+          << e->name() << " " << filter_name(filter);
+  EXPECT_NEAR(static_cast<double>(asked) / static_cast<double>(all), 0.25, 0.02);
 }
 
 // A wrong method for each of the mistakes that the list is there to find.
@@ -163,7 +186,7 @@ TEST(Verify, CoverageTellsPassedFailedAndSkippedApart) {
 }
 
 TEST(Verify, BrokenEncodingsAreNoticed) {
-  const Report broken = run("analytic", {.tamper = shift_values});
+  const Report broken = run("analytic", {.one_in = test::full_tier() ? 1U : 3U, .tamper = shift_values});
   for (const Encoding* e : all_encodings())
     for (const Filter filter : e->filters())
       EXPECT_GT(failed_of(broken, e->name(), filter_name(filter)), 0u) << e->name() << " " << filter_name(filter);

@@ -16,6 +16,7 @@ struct Arguments {
   std::vector<std::string> suites;
   std::string context = "egl";
   std::string output;
+  std::size_t one_in = 1;
   bool full = false;
   bool json = false;
 };
@@ -56,6 +57,7 @@ int run(const Arguments& a) {
   verify::VerifyOptions options;
   options.context = parse_context_kind(a.context);
   options.full = a.full;
+  options.one_in = a.one_in;
   const bool terminal = isatty(STDERR_FILENO) != 0;
   if (terminal) options.progress = [](const std::string& name) { fmt::print(stderr, "\r\033[K{}", name.substr(0, 100)); };
   verify::Report report;
@@ -88,6 +90,8 @@ void add_verify_command(CLI::App& app, Command& chosen) {
   CLI::App* c = app.add_subcommand("verify", "the numerical verification and stability suites, as tables");
   c->add_option("--suite", a->suites, "one suite, or several times one: " + names + " (default: all)");
   c->add_flag("--full", a->full, "more meshes, seeds and steps; takes many minutes");
+  c->add_option("--one-in", a->one_in, "ask each case of one in so many encodings and filters, in turn (default: of all)")
+      ->check(CLI::PositiveNumber);
   c->add_option("--context", a->context, "egl, egl_device or osmesa");
   c->add_flag("--json", a->json, "for programs");
   c->add_option("--out", a->output, "folder for verify.json, table.md and cases.csv as well");

@@ -117,7 +117,12 @@ void VerifyContext::tell(const std::string& name) const {
 
 void VerifyContext::for_each(const std::string& name, std::span<const EncodingCase> cases, const Body& body) {
   tell(name);
+  std::size_t turn = asked_++;
   for (const EncodingCase& c : cases) try {
+      if (turn++ % options_.one_in != 0) {
+        skip(name, &c, fmt::format("one in {} is asked", options_.one_in));
+        continue;
+      }
       const Verdict verdict = options_.list ? NotAsked{"listed"} : body(c);
       if (const Check* check = std::get_if<Check>(&verdict))
         add(name, &c, *check);

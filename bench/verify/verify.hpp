@@ -56,8 +56,9 @@ struct Report {
 
 struct VerifyOptions {
   ContextKind context = ContextKind::egl;
-  bool full = false;                                   ///< the experiment's size, not the one of a few minutes
-  bool list = false;                                   ///< no case is run: all are reported as skipped, "listed"
+  bool full = false;       ///< the experiment's size, not the one of a few minutes
+  bool list = false;       ///< no case is run: all are reported as skipped, "listed"
+  std::size_t one_in = 1;  ///< each case is asked of one in so many encodings and filters, the next case of the next ones
   std::function<void(EncodedField&)> tamper{};         ///< done to each built field: tests break encodings with it
   std::function<void(const std::string&)> progress{};  ///< told the name of each case before it runs
 };
@@ -107,6 +108,7 @@ class VerifyContext {
   void tell(const std::string& name) const;
 
   std::string suite_;
+  std::size_t asked_ = 0;  ///< cases so far
 };
 
 struct Suite {
