@@ -62,14 +62,6 @@ Picture draw_boxes(const AmrHierarchy& h, const EncodingCase& c, const Scene& sc
   return consumer.read();
 }
 
-bool gives_boxes(const AmrHierarchy& h, const EncodingCase& c) {
-  try {
-    return !build(h, c, {.draw_boxes = true}).draw_tree.empty();
-  } catch (const UnsupportedError&) {
-    return false;
-  }
-}
-
 // ---- closed forms ----
 
 TEST(Clip, OfAConstantMediumInHalfHalvesItsWay) {
