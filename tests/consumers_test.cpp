@@ -203,7 +203,7 @@ void expect_multipass(const AmrHierarchy& h, const EncodingCase& c, Scene scene,
   EXPECT_GT(largest(expected), 0.05);
   scene.settings.consumer = ConsumerKind::multipass;
   const Picture picture = draw_scene(h, c, scene);
-  if (c.filter == Filter::nearest && scene.settings.sampling == Sampling::adaptive)
+  if (!interpolating(c) && scene.settings.sampling == Sampling::adaptive)
     EXPECT_LE(differing_pixels(picture, expected, tolerance), expected.width * expected.height / 50);
   else
     EXPECT_LE(difference(picture, expected), tolerance * std::max(1.0, largest(expected)));

@@ -393,7 +393,7 @@ TEST(LevelOfDetail, TheContextDrawsWhatTheTextComputesWithFewerSamples) {
     const Picture picture = draw(gl, h, field, pruned, &coarse);
     // rays are floats here and doubles there. A ray through opposite faces of a region has samples in faces of its cells, which
     // nearest takes on either side
-    const double bound = c.filter == Filter::nearest ? 3e-3 : 1e-4;
+    const double bound = interpolating(c) ? 1e-4 : 3e-3;
     EXPECT_LT(rms_difference(picture, render_on_cpu(h, field, pruned, false)), bound);
     const Picture whole = draw(gl, h, field, scene_of(h, kNoThreshold), &fine);
     EXPECT_LT(coarse.samples, fine.samples);

@@ -287,7 +287,7 @@ TEST(Lamp, ConvergesToTheReferenceInEveryFilter) {
         if (!references.contains(key)) references.emplace(key, HierarchyReference(h, 0, field.definition).render(scene, 0.5));
         std::vector<double> errors;
         Picture drawn;
-        for (const double step : {1.0, c.filter == Filter::nearest ? 0.05 : 0.1}) {
+        for (const double step : {1.0, interpolating(c) ? 0.1 : 0.05}) {
           scene.settings.step = scene.settings.point_light->shadow_step = step;
           drawn = render_on_cpu(h, field, scene, true);
           errors.push_back(rms_difference(drawn, references.at(key)));
