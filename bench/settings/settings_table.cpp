@@ -141,16 +141,15 @@ SettingTable<RenderPoint> make_frame_settings() {
 
 SettingTable<BuildPoint> make_build_settings() {
   std::vector<Setting<BuildPoint>> rows;
-  rows.push_back(
-      {{.name = "filters",
-        .type = choice_type(filter_names()),
-        .reference = AffectsReference::yes,
-        .help = "the field between cell values ([shaders/README.md](../shaders/README.md#filters)). One that an encoding lacks "
-                "gives a record `unsupported`",
-        .record_name = "filter",
-        .column = {"filter"}},
-       [](const BuildPoint& b) -> Json { return filter_name(b.filter); },
-       [](BuildPoint& b, const Json& v) { b.filter = parse_filter(v.get<std::string>()); }});
+  rows.push_back({{.name = "filters",
+                   .type = choice_type(filter_names()),
+                   .reference = AffectsReference::yes,
+                   .help = "the field between cell values ([docs/filters.md](filters.md)). One that an encoding lacks "
+                           "gives a record `unsupported`",
+                   .record_name = "filter",
+                   .column = {"filter"}},
+                  [](const BuildPoint& b) -> Json { return filter_name(b.filter); },
+                  [](BuildPoint& b, const Json& v) { b.filter = parse_filter(v.get<std::string>()); }});
   rows.push_back({{.name = "storage",
                    .type = choice_type(storage_names()),
                    .reference = AffectsReference::no,
