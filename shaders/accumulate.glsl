@@ -44,9 +44,12 @@ STRUCT Accumulation {
   ray_real after;      // ... the one across the surface (units of ray length)
   ray_real between;    // where the interval of the one ends and that of the other begins
   int end_state;       // pre-integrated: one of AMRTEX_END_..., and ...
-  real end_axis;       // ... the axis value there
-  int end_level;       // by tolerance: level of the region that it was taken in
-  real stride;         // by tolerance: length of the next interval to try
+  real end_axis;       // ... the axis value there; by tolerance the value itself
+  int end_level;       // by tolerance: level of the region that it was taken in, ...
+  real stride;         // ... length of the next interval to try, ...
+  real whole;          // ... of the ray, ...
+  real passed;         // ... of the part of it before this one, ...
+  real spent;          // ... and the bound of the error so far
   vec4r surface;       // depth: world distance to the first surface; normal: its normal, 1
   bool probing;        // a secondary ray that looks for surfaces and gathers nothing
   ivec3 counted;       // samples, regions, regions skipped
@@ -69,6 +72,9 @@ Accumulation empty_accumulation() {
   a.end_axis = real(0);
   a.end_level = -1;
   a.stride = real(1e30);
+  a.whole = real(1);
+  a.passed = real(0);
+  a.spent = real(0);
   a.surface = vec4r(0);
   a.probing = false;
   a.counted = ivec3(0);

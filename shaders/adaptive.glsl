@@ -69,7 +69,7 @@ real march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(
                            IN(real) from, IN(real) phase) {
   real inverse_width = real(1) / real(r.width);
   if (AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE) {
-    march_tolerance_region(a, r, f * inverse_width, direction * inverse_width, length, AMRTEX_EARLY_END != 0 ? u_early_end : real(0));
+    march_tolerance_region(a, r, f * inverse_width, direction * inverse_width, length, real(begin), AMRTEX_EARLY_END != 0 ? u_early_end : real(0));
     return from;
   }
   // a float counts to 2^24: the host refuses smaller steps, and no loop is endless

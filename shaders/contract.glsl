@@ -171,6 +171,11 @@ void fetch_stencil(IN(Region) r, IN(ivec3) octant, OUT(Stencil) s) {
 }
 #endif
 
+// Optional: may hats of finer cells than the region's reach into it?
+#ifndef AMRTEX_FINER_HATS
+#define AMRTEX_FINER_HATS false
+#endif
+
 // Optional: level of the leaf cell that holds a position of the region, where that is not the region's own.
 #ifndef AMRTEX_LEAF_LEVEL
 #define AMRTEX_LEAF_LEVEL(r) (r).level

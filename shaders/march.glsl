@@ -61,6 +61,7 @@ bool picture_ended(IN(Accumulation) a) { return (AMRTEX_ISOVALUES != 0 && surfac
 
 // The picture's value for one ray.
 vec4r march_ray(IN(Ray) ray, INOUT(Accumulation) a) {
+  if (AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE) open_account(a, real(ray.length), real(0), real(ray.length));
 #if AMRTEX_CPP || AMRTEX_MIRROR
   for (int i = 0; i < (AMRTEX_MIRROR != 0 ? 2 : 1); ++i) {
     Ray part = ray;
@@ -69,6 +70,7 @@ vec4r march_ray(IN(Ray) ray, INOUT(Accumulation) a) {
     a.before = ray_real(0);  // on the mirror, where the part before noted its side
     a.end_state = AMRTEX_END_NONE;
     a.end_level = -1;
+    a.passed = real(part.start - ray.start);
     if (drawn) march_part(part, a, goes_on);
   }
 #else

@@ -16,14 +16,11 @@
 namespace amrtex {
 namespace {
 
-/// Longest interval that `tolerance` tries, in cell widths of the region.
-constexpr double kLongestInterval = 8;
 /// Part of the tolerance that a ray may leave behind it.
 constexpr double kToleranceLeft = 0.1;
-
-/// Error that one interval may have: a smaller tolerance needs more of them, so each gets a smaller part. Errors of
-/// intervals cancel in part, and corrected ones are smaller than estimated; the factor is measured (experiments/tolerance).
-double interval_error(double tolerance) { return 1.2 * std::pow(tolerance, 1.25); }
+/// What the bounds of a pixel's intervals may come to, in tolerances. Errors are smaller than their bounds and cancel in part;
+/// the factor is measured (tests/tolerance_test.cpp), and no pixel is off by more than it and kToleranceLeft.
+constexpr double kSumOfBounds = 2;
 
 /// Cells of one level that may lie in a row in a region: along the diagonal of its largest patch, or of the largest page.
 double longest_run(const DomainGeometry& geometry) {
@@ -91,8 +88,7 @@ void add_integrator(const DomainGeometry& geometry, const Scene& scene, const Fi
                     filter_name(definition.filter), fmt::join(accepted, ", ")));
   }
   b.define("AMRTEX_CONTINUOUS", filter_info(definition.filter).continuity == Continuity::everywhere ? 1 : 0);
-  b.set("u_interval_error", interval_error(s.tolerance));
-  b.set("u_longest", kLongestInterval);
+  b.set("u_error_bound", kSumOfBounds * s.tolerance);
 }
 
 }  // namespace
