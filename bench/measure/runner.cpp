@@ -13,6 +13,7 @@
 #include "bench/measure/error_split.hpp"
 #include "bench/measure/left_out_time.hpp"
 #include "bench/measure/shader_cache.hpp"
+#include "bench/measure/value_resolution.hpp"
 #include "bench/numbers/image_error.hpp"
 #include "bench/numbers/statistics.hpp"
 #include "bench/records/record.hpp"
@@ -249,6 +250,10 @@ class Runner {
     record["image_hash"] = picture_hash(picture);
     record["context"]["shader_hash"] = consumer->shader_hash();
     for (const std::string& text : scene_warnings(*mesh_, scene)) warn(record, text);
+    if (const ValueResolution resolution = value_resolution(built.structure.field, scene); !resolution.fine()) {
+      record["value_resolution"] = resolution.json();
+      for (const std::string& text : resolution.warnings()) warn(record, text);
+    }
     if (scene.settings.slice_target == SliceTarget::rgba8)
       warn(record, "slices were blended in 8 bits a channel (slice_target rgba8): a historical control");
     if (!consumer->transfer_exact())
