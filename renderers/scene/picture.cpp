@@ -31,7 +31,7 @@ std::vector<float> as_floats(const Picture& picture) {
 }
 
 /// Do 32-bit floats hold the picture: each value, or of raw ones as much as a structure's floats would (value_units.hpp)?
-bool floats_hold(const Picture& picture) {
+bool fits_floats(const Picture& picture) {
   double min = std::numeric_limits<double>::infinity(), max = -min, least = 0;
   bool exact = true;
   for (const double v : picture.values) {
@@ -93,12 +93,12 @@ void read_values(std::ifstream& in, Picture& picture, std::size_t count, const s
 
 std::string picture_hash(const Picture& picture) {
   const auto hash_of = [](const auto& values) { return XXH3_128bits(values.data(), values.size() * sizeof(values[0])); };
-  const XXH128_hash_t h = floats_hold(picture) ? hash_of(as_floats(picture)) : hash_of(picture.values);
+  const XXH128_hash_t h = fits_floats(picture) ? hash_of(as_floats(picture)) : hash_of(picture.values);
   return fmt::format("{:016x}{:016x}", h.high64, h.low64);
 }
 
 void write_npy(const Picture& picture, const std::filesystem::path& path, bool as_double) {
-  as_double = as_double || !floats_hold(picture);
+  as_double = as_double || !fits_floats(picture);
   const std::string header = npy_header(picture, as_double);
   const auto temporary = std::filesystem::path(fmt::format("{}.{}.part", path.string(), getpid()));
   {
