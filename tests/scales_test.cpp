@@ -34,10 +34,13 @@ struct Ramp {
   AmrHierarchy mesh() const {
     return MeshBuilder({kCells, 4, 4}).root([*this](const Vec3d& p) { return of(p.x); }).hierarchy();
   }
-  /// Where x counts: at the cell's centre, or no further than the outer ones.
+  /// The x whose value stands at x: the cell's centre; no further than the outer centres; or with vertices half as fast beyond
+  /// the outer ones, whose value is their only cell's.
   static double place(Filter filter, double x) {
-    if (filter == Filter::nearest) return (std::floor(x * kCells) + 0.5) / kCells;
-    return std::clamp(x, 0.5 / kCells, 1 - 0.5 / kCells);
+    constexpr double kWidth = 1.0 / kCells;
+    if (filter == Filter::nearest) return (std::floor(x * kCells) + 0.5) * kWidth;
+    if (filter != Filter::linear_vertex) return std::clamp(x, 0.5 * kWidth, 1 - 0.5 * kWidth);
+    return x < kWidth ? (x + kWidth) / 2 : x > 1 - kWidth ? (x + 1 - kWidth) / 2 : x;
   }
   /// What doubles of cells may be off by, in parts of the scale.
   double rounding() const { return std::abs(offset) / scale * 0x1p-52; }
@@ -72,10 +75,7 @@ Scene light_scene(const Ramp& ramp) {
   return scene;
 }
 
-/// The x of a column, from the left of the picture: a view along +y has x to the right.
-double column_x(const Scene& scene, int column) { return (column + 0.5) / scene.settings.width; }
-
-/// Largest difference to `expected(x)`, which is told in parts of `unit`.
+/// Largest difference to `expected(x)`, x from 0 to 1 over the columns from the left, which is told in parts of `unit`.
 template <class Expected>
 double worst(const Picture& picture, int channel, const Expected& expected, double unit = 1) {
   double largest = 0;
@@ -90,8 +90,9 @@ double worst(const Picture& picture, int channel, const Expected& expected, doub
 /// Opacity of a column: the curve goes from 0 to 4 over a length of 1.
 double ramp_opacity(Filter filter, double x) { return -std::expm1(-4 * Ramp::place(filter, x)); }
 
-/// Beside 2^-20 of the range that floats may lose: what float sums do, and the doubles of the file.
-double tolerance_of(const Ramp& ramp) { return 4e-6 + 4 * ramp.rounding(); }
+/// In parts of the range: 2^-20 that floats may lose, and float sums; half a quantum by which samples are off, 2^-13 of a cell;
+/// the doubles of the file.
+double tolerance_of(const Ramp& ramp) { return 4e-6 + 0x1p-13 / Ramp::kCells + 4 * ramp.rounding(); }
 
 void expect_opacities(const Picture& picture, Filter filter, const Ramp& ramp) {
   EXPECT_LE(worst(picture, 3, [&](double x) { return ramp_opacity(filter, x); }), 4 * tolerance_of(ramp));
@@ -141,10 +142,7 @@ TEST(Units, ArePlainForOrdinaryFieldsAndFollowFromValuesAlone) {
 TEST(Units, AreTheSameForAllEncodingsAndFilters) {
   for (const Ramp& ramp : {kRamps[1], kRamps[5]}) {
     const AmrHierarchy h = ramp.mesh();
-    for_each_filter([&](const EncodingCase& c) {
-      EXPECT_EQ(build(h, c).scale.units, value_units(h.statistics(0)));
-      if (accepted(h, c, {.storage = Storage::r32f})) EXPECT_EQ(build(h, c).scale.offset, value_units(h.statistics(0)).offset);
-    });
+    for_each_filter([&](const EncodingCase& c) { EXPECT_EQ(build(h, c).scale.units, value_units(h.statistics(0))); });
   }
 }
 
@@ -202,7 +200,7 @@ TEST(Values, OfAnyScaleHaveTheirIsosurfaceWhereTheyAre) {
 
 TEST(Values, OfAnyScaleAreDrawnOnGl) {
   Context& gl = context(ContextKind::egl);
-  for (const Ramp& ramp : kRamps) {
+  for (const Ramp& ramp : {kRamps[1], kRamps[4], kRamps[5]}) {
     const AmrHierarchy h = ramp.mesh();
     SCOPED_TRACE(name_of(ramp));
     for_each_chosen([&](const EncodingCase& c) {
@@ -409,7 +407,8 @@ TEST(ThinCells, HaveTheThicknessThatTheyHaveAtAnyAspect) {
       for_each_filter(
           [&](const EncodingCase& c) { EXPECT_LE(thin_error(render_on_cpu(h, build(h, c), scene, false), scene, h), 1e-5); });
       for_each_chosen([&](const EncodingCase& c) {
-        if (aspect == 1e4 || aspect == 1e6) EXPECT_LE(thin_error(draw(gl, h, build(h, c), scene), scene, h), 1e-5);
+        if (aspect != 1e4 && aspect != 1e6) return;
+        EXPECT_LE(thin_error(draw(gl, h, build(h, c), scene), scene, h), 1e-5);
       });
       EXPECT_LE(thin_error(HierarchyReference(h, 0, {Filter::nearest}).render(scene, 1), scene, h), 1e-9);
     }
