@@ -27,15 +27,19 @@ void march_surfaces(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front, IN(b
 }
 #endif
 
-// The picture's value for a ray that misses the drawn box.
+// The picture's value for a ray that misses the drawn box. Largest numbers of offset pictures are told from none by the host.
 vec4r missed_picture() {
+  if (AMRTEX_MODE == AMRTEX_MODE_MIP && AMRTEX_OFFSET_PICTURE != 0) return vec4r(as_real(0xff800000u), real(0), real(0), real(1));
   return vec4r(real(0), real(0), real(0), real(AMRTEX_MODE == AMRTEX_MODE_PROJECTION || AMRTEX_MODE == AMRTEX_MODE_MIP ? 1 : 0));
 }
 
-// The picture's value for what a ray has gathered, surfaces apart: premultiplied RGBA, or (value, 0, 0, 1).
+// The picture's value for what a ray has gathered, surfaces apart: premultiplied RGBA, or (value, 0, 0, 1); of offset projections
+// (value, length of what has values in two parts, 1).
 vec4r volume_picture(IN(Accumulation) a) {
   if (AMRTEX_MODE == AMRTEX_MODE_DVR) return vec4r(a.color, real(1) - a.transmittance);
+  if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION && AMRTEX_OFFSET_PICTURE != 0) return vec4r(a.sum * u_length_unit, a.passed, -a.passed_lost, real(1));
   if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION) return vec4r(a.sum * u_length_unit, real(0), real(0), real(1));
+  if (AMRTEX_OFFSET_PICTURE != 0) return vec4r(a.maximum, real(0), real(0), real(1));
   return vec4r(a.maximum < real(-3.4028235e38) ? real(0) : a.maximum, real(0), real(0), real(1));
 }
 
@@ -77,5 +81,11 @@ vec4r march_ray(IN(Ray) ray, INOUT(Accumulation) a) {
   march_part(ray, a, false);
 #endif
   if (AMRTEX_ISOVALUES != 0) return surface_picture(a);
+  if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION && AMRTEX_OFFSET_PICTURE != 0 && AMRTEX_VALIDITY == 0) {
+    // every place has a value: the length is the ray's own, to all digits
+    ray_real whole = ray.length - ray.first;
+    a.passed = real(whole);
+    a.passed_lost = -real(whole - ray_real(a.passed));
+  }
   return volume_picture(a);
 }

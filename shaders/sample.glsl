@@ -27,6 +27,7 @@ bool region_invisible(IN(Accumulation) a, IN(Region) r) {
   if (AMRTEX_SEVERAL_FIELDS) return !fields_visible(r);
   if (AMRTEX_DRAWS_VOLUME) return !transfer_visible(r.value_range);
   if (AMRTEX_MODE == AMRTEX_MODE_ISO) return true;
+  if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION && AMRTEX_OFFSET_PICTURE != 0) return false;
   if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION) return r.value_range.x == real(0) && r.value_range.y == real(0);
   return r.value_range.y <= a.maximum;
 }

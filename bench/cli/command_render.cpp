@@ -3,6 +3,7 @@
 #include "bench/cli/commands.hpp"
 #include "bench/measure/error_split.hpp"
 #include "bench/measure/scene_data.hpp"
+#include "bench/measure/value_resolution.hpp"
 #include "bench/settings/experiment.hpp"
 #include "renderers/bindings/scene_needs.hpp"
 #include "renderers/consumers/make_consumer.hpp"
@@ -126,6 +127,7 @@ int run(const Arguments& a) {
   const Encoding& encoding = find_encoding(build.encoding);
   require_support(encoding, request.context);
   EncodedField field = encoding.build(mesh, request);
+  for (const std::string& warning : value_resolution(field, drawn).warnings()) fmt::print(stderr, "warning: {}\n", warning);
   if (a.reference) {
     write_picture(a, HierarchyReference(mesh, 0, field.definition).render(drawn, reference_step(a, scene)), scene, mesh);
     return 0;

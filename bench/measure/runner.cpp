@@ -15,6 +15,7 @@
 #include "bench/measure/scene_data.hpp"
 #include "bench/measure/shader_cache.hpp"
 #include "bench/measure/stopwatch.hpp"
+#include "bench/measure/value_resolution.hpp"
 #include "bench/records/record.hpp"
 #include "renderers/bindings/scene_needs.hpp"
 #include "renderers/consumers/make_consumer.hpp"
@@ -168,6 +169,10 @@ class Runner {
     if (!scene.settings.triangles.empty()) record["triangle_seconds"] = consumer->triangle_seconds();
     record["image_hash"] = picture_hash(picture);
     record["context"]["shader_hash"] = consumer->shader_hash();
+    if (const ValueResolution resolution = value_resolution(built.structure.field, scene); !resolution.fine()) {
+      record["value_resolution"] = resolution.json();
+      for (const std::string& text : resolution.warnings()) warn(record, text);
+    }
     add_warnings(record, scene, *consumer);
     const std::optional<Judgement> own =
         add_errors(record, {experiment_, data(), built.structure, *context_, scene, picture, options_.folder / "references"});

@@ -20,6 +20,7 @@
 #include "renderers/reference/reference_surface.hpp"
 #include "renderers/reference/reference_tracer.hpp"
 #include "renderers/scene/scene_settings.hpp"
+#include "renderers/scene/stored_units.hpp"
 #include "renderers/scene/triangle_layer.hpp"
 
 namespace amrtex {
@@ -36,12 +37,13 @@ struct Drawing {
   Mode mode;
   double part;  // world length of the largest part
   const TransferTable* table;
+  ValueUnits units;               // of the field's numbers
   const AnalyticField* truth;     // drawn instead of the field, where it is not null
   std::vector<ClipPlane> planes;  // finest cells
   std::optional<Mirror> mirror;
 };
 
-Drawing make_drawing(const AmrHierarchy& h, const Scene& scene, double step, const TransferTable* table,
+Drawing make_drawing(const AmrHierarchy& h, const Scene& scene, double step, const TransferTable* table, const ValueUnits& units,
                      const AnalyticField* truth) {
   const Vec3d domain(h.cells(h.finest_level()));
   const Vec3d spacing = h.spacing(h.finest_level());
@@ -53,6 +55,7 @@ Drawing make_drawing(const AmrHierarchy& h, const Scene& scene, double step, con
             scene.settings.mode,
             step * std::min({spacing.x, spacing.y, spacing.z}),
             table,
+            units,
             truth,
             {},
             {}};
@@ -114,7 +117,8 @@ class AnalyticRay {
 
  private:
   double value(double t) const {
-    return drawing_.truth->value(drawing_.domain_lower + (ray_.origin + t * ray_.direction) / drawing_.cells_a_length);
+    const Vec3d p = drawing_.domain_lower + (ray_.origin + t * ray_.direction) / drawing_.cells_a_length;
+    return drawing_.units.number(drawing_.truth->value(p));
   }
 
   const Drawing& drawing_;
@@ -178,11 +182,14 @@ void draw_fields(ReferenceTracer& first, std::vector<ReferenceTracer>& others, c
 double line_integral(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const Drawing& drawing) {
   const double part = drawing.part;
   double sum = 0;
+  double passed = 0;  // what has values
   trace(tracer, parts, drawing, [&](const PieceFunction& f, double from, double to) {
+    passed += to - from;
     sum += (to - from) * mean(f, static_cast<int>(std::clamp(std::ceil((to - from) / part), 1.0, 16.0)));
     return true;
   });
-  return sum;
+  const ValueUnits& units = drawing.units;
+  return units.offset == 0 ? units.scale * sum : units.scale * sum + units.offset * passed;
 }
 
 double line_maximum(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const Drawing& drawing) {
@@ -191,7 +198,7 @@ double line_maximum(ReferenceTracer& tracer, const std::vector<RayPart>& parts, 
     if (f.upper > best) best = std::max(best, maximum(f));
     return true;
   });
-  return std::isfinite(best) ? best : 0;
+  return std::isfinite(best) ? drawing.units.value(best) : 0;
 }
 
 /// What one thread draws with.
@@ -304,7 +311,10 @@ HierarchyReference::HierarchyReference(const AmrHierarchy& hierarchy, int field,
     : data_(new Data(hierarchy, field, definition)) {}
 HierarchyReference::~HierarchyReference() = default;
 
-std::optional<double> HierarchyReference::sample(const FinestPosition& p) const { return data_->points.local().value(p); }
+std::optional<double> HierarchyReference::sample(const FinestPosition& p) const {
+  const std::optional<double> number = data_->points.local().value(p);
+  return number ? std::optional(data_->filter->field().units().value(*number)) : std::nullopt;
+}
 
 std::optional<double> HierarchyReference::sample(const Vec3d& p_world) const {
   const auto p = finest_position(data_->filter->hierarchy(), p_world);
@@ -321,15 +331,20 @@ Picture HierarchyReference::render(const Scene& scene, double step, const Analyt
   return draw(scene, step, &truth);
 }
 
-Picture HierarchyReference::draw(const Scene& scene, double step, const AnalyticField* truth) const {
-  check(scene, step);
+Picture HierarchyReference::draw(const Scene& given, double step, const AnalyticField* truth) const {
+  check(given, step);
   const AmrHierarchy& h = data_->filter->hierarchy();
+  require_resolved(h, given);
+  const Scene scene = in_units(given, [&](int number) {
+    return number == 0 ? data_->filter->field().units()
+                       : data_->other_filter(given.more_fields[static_cast<std::size_t>(number) - 1].field)->field().units();
+  });
   const FilterReference* color_filter = data_->color_filter(scene);
   std::optional<TransferTable> table;
   if (scene.settings.draws_volume()) table.emplace(scene.transfer_function, extinction_scale(h, scene.transfer_function));
-  const Drawing drawing = make_drawing(h, scene, step, table ? &*table : nullptr, truth);
+  const Drawing drawing = make_drawing(h, scene, step, table ? &*table : nullptr, data_->filter->field().units(), truth);
   std::optional<SurfaceScene> surfaces;
-  if (scene.settings.draws_surfaces()) surfaces.emplace(scene, *data_->filter, color_filter, drawing.table, drawing.part);
+  if (scene.settings.draws_surfaces()) surfaces.emplace(given, scene, *data_->filter, color_filter, drawing.table, drawing.part);
   if (surfaces) {
     surfaces->lower = drawing.lower;
     surfaces->upper = drawing.upper;

@@ -84,10 +84,10 @@ void SurfaceFinder::cross(const PieceFunction& f, double length, std::size_t sur
   }
 }
 
-SurfaceScene::SurfaceScene(const Scene& s, const FilterReference& f, const FilterReference* color, const TransferTable* table,
-                           double largest_part)
-    : scene(s), settings(s.settings.isosurfaces), filter(f), color_filter(color), volume(table), part(largest_part) {
-  for (const double value : settings.values) rgb.push_back(surface_color(scene, value));
+SurfaceScene::SurfaceScene(const Scene& s, const Scene& stored, const FilterReference& f, const FilterReference* color,
+                           const TransferTable* table, double largest_part)
+    : scene(s), settings(stored.settings.isosurfaces), filter(f), color_filter(color), volume(table), part(largest_part) {
+  for (const double value : scene.settings.isosurfaces.values) rgb.push_back(surface_color(scene, value));
 }
 
 void SurfacePainter::draw(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const std::optional<Mirror>& mirror,
@@ -148,7 +148,7 @@ Vec3d SurfacePainter::color_at(const Vec3d& p, std::size_t surface, const Vec3d&
   if (color_point_) {
     const auto position = position_at(scene_.color_filter->hierarchy(), p);
     const auto value = position ? color_point_->value(*position) : std::nullopt;
-    if (value) rgb = surface_color(scene_.scene, *value);
+    if (value) rgb = surface_color(scene_.scene, scene_.color_filter->field().units().value(*value));
   }
   if (scene_.settings.shading == Shading::none && !around_) return rgb;
   const Vec3d normal = normal_at(p);

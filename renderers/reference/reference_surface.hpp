@@ -44,11 +44,12 @@ class SurfaceFinder {
 
 /// What the rays of one picture share.
 struct SurfaceScene {
-  SurfaceScene(const Scene& scene, const FilterReference& filter, const FilterReference* color_filter,
+  /// `stored`: the scene in the field's units.
+  SurfaceScene(const Scene& scene, const Scene& stored, const FilterReference& filter, const FilterReference* color_filter,
                const TransferTable* volume, double part);
 
   const Scene& scene;
-  const Isosurfaces& settings;
+  const Isosurfaces& settings;  ///< in the field's units
   const FilterReference& filter;
   const FilterReference* color_filter;  ///< over a second field; null: the isovalue gives the colour
   const TransferTable* volume;          ///< null: surfaces alone

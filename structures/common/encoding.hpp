@@ -59,8 +59,8 @@ struct SceneNeeds {
   bool validity = false;            ///< bits are kept though every cell has a value
   bool border = false;              ///< a border is kept though the filter reads none
   bool field_ranges = false;        ///< several fields are drawn: those beside the first have value ranges as well
-  /// First and last value of intervals without extinction, ascending (renderers/bindings/scene_bindings.hpp): parts of the structure
-  /// whose values lie in one of them are left out. Empty: all are kept.
+  /// First and last value of intervals without extinction, ascending (renderers/bindings/scene_bindings.hpp): parts of the
+  /// structure whose values lie in one of them are left out. Empty: all are kept.
   std::vector<std::array<double, 2>> invisible = {};
   bool operator==(const SceneNeeds&) const = default;
   bool keeps_validity() const { return everything || validity; }
@@ -95,6 +95,7 @@ struct EncodedField {
   int field_count = 1;
   StorageScale scale;                      ///< of the first field
   std::vector<StorageScale> more_scales;   ///< of the others
+  std::vector<FieldStatistics> values;     ///< of each field
   double range_origin = 0;                 ///< what coded value ranges are relative to (build_tools.hpp)
   std::vector<double> more_range_origins;  ///< of the other fields, where they have ranges (SceneNeeds::field_ranges)
   /// What was asked to be left out where nothing is to be seen (SceneNeeds::invisible): such a field shows no scene that sees any

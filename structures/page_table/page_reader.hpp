@@ -83,15 +83,16 @@ class PageReader {
   std::vector<std::uint8_t> missing_;
 };
 
-/// The table holds a float: what it would lose, a page of the same storage must lose as well.
-inline bool constant_is_exact(double v, Storage storage) {
-  return storage == Storage::r32f || static_cast<double>(static_cast<float>(v)) == v;
+/// The table holds a float in the field's units: what it would lose, a page of the same storage must lose as well.
+inline bool constant_is_exact(double number, Storage storage) {
+  return storage == Storage::r32f || static_cast<double>(static_cast<float>(number)) == number;
 }
 
 /// A constant page is one of a single field: an entry has room for one value, and what is constant in
 /// one field seldom is in the others.
-inline bool is_constant(const PageContents& c, const BuildRequest& request) {
-  return request.more_fields.empty() && c.all && c.range.min == c.range.max && constant_is_exact(c.range.min, request.storage);
+inline bool is_constant(const PageContents& c, const BuildRequest& request, const ValueUnits& units) {
+  return request.more_fields.empty() && c.all && c.range.min == c.range.max &&
+         constant_is_exact(units.number(c.range.min), request.storage);
 }
 
 /// Which pages the scene cannot show.
@@ -99,8 +100,9 @@ class HiddenPages {
  public:
   HiddenPages(const AmrHierarchy& h, const BuildRequest& request, const Options& o)
       : request_(request), statistics_(h.statistics(request.field)), leak_(most_leaked(request, o)) {}
+  ValueUnits units() const { return value_units(statistics_); }
   bool operator()(const PageContents& c) const {
-    const StorageScale scale = storage_scale(request_.storage, statistics_.min, statistics_.max);
+    const StorageScale scale = storage_scale(request_.storage, statistics_);
     ValueRange range = c.range;
     if (!range.empty()) range = {range.min - leak_, range.max + leak_};
     return hidden(request_.needs, range, range_origin(statistics_, request_.storage, scale), request_.storage, scale);
@@ -124,8 +126,11 @@ inline void classify(PageReader& reader, const BuildRequest& request, const Hidd
   if (page.pruned) return;  // absent, at its own level: rays step over the same box
   for (const int other : request.more_fields)
     if (!c.any) c = reader.read(page, other);
-  page.kind = !c.any ? AMRTEX_PAGE_ABSENT : is_constant(c, request) ? AMRTEX_PAGE_CONSTANT : AMRTEX_PAGE_STORED;
-  if (page.kind == AMRTEX_PAGE_CONSTANT) page.green = std::bit_cast<std::uint32_t>(static_cast<float>(c.range.min));
+  page.kind = !c.any                                       ? AMRTEX_PAGE_ABSENT
+              : is_constant(c, request, is_hidden.units()) ? AMRTEX_PAGE_CONSTANT
+                                                           : AMRTEX_PAGE_STORED;
+  if (page.kind == AMRTEX_PAGE_CONSTANT)
+    page.green = std::bit_cast<std::uint32_t>(static_cast<float>(is_hidden.units().number(c.range.min)));
 }
 
 /// Reads every page to learn what is absent or constant, then numbers the stored ones.
