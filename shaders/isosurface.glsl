@@ -1,6 +1,6 @@
 // Isosurfaces on the sampler contract: where a ray crosses one, and what it adds to the picture.
 // A hit is a change of side of f - isovalue between consecutive samples that both have a value,
-// across regions too. Entering or leaving the mesh is none.
+// across regions too. Entering or leaving the mesh is none. A ray has samples at its two ends as well.
 DEFINE_INT(AMRTEX_ISOVALUES)  // how many isosurfaces are drawn; 0 leaves out what they need
 #if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
 DEFINE_INT(AMRTEX_OUTPUT)               // one of the AMRTEX_OUTPUT_... below
@@ -312,13 +312,6 @@ void draw_surface(IN(Ray) ray, INOUT(Accumulation) a) {
   if (AMRTEX_DRAWS_VOLUME) shift_volume(a, value, shift, lit.y);
   composite_surface(ray, a, p, k, rising ? k : k + 1, lit.x);
   if (AMRTEX_DRAWS_VOLUME) shift_volume(a, value, -shift, lit.y);
-}
-
-// A sample at the ray's end, of no length: a surface between the last sample and a mirror (or a triangle) there is not lost.
-void note_end(IN(Ray) ray, INOUT(Accumulation) a) {
-  FieldSample s;
-  bool has_value = sample_field(make_position(ray.entry + ray.direction * ray.length), s);
-  note_side(a, !has_value, s.value, ray.length, ray.length);
 }
 
 // An opaque surface ends a ray; pictures of depth and normals end at the first.

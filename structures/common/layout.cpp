@@ -14,12 +14,12 @@ double mebibytes(std::int64_t bytes) { return static_cast<double>(bytes) / 10485
 }  // namespace
 
 std::int64_t Part::texels() const {
-  return kind == HostTexture::Kind::buffer ? elements : std::int64_t{size.x} * size.y * size.z;
+  return kind == HostTexture::Kind::buffer ? elements : Box{Vec3i(0), size}.cells();
 }
 
 std::int64_t Part::bytes() const {
   const std::int64_t least = kind == HostTexture::Kind::buffer ? 1 : 0;
-  return std::max(texels(), least) * texel_bytes(format);
+  return (CheckedSize(std::max(texels(), least)) * CheckedSize(texel_bytes(format))).or_most();
 }
 
 HostTexture Part::allocate() const {
@@ -99,17 +99,17 @@ void Layout::leave_out(const LeftOut& entry) {
 }
 
 std::int64_t Layout::bytes() const {
-  std::int64_t all = 0;
+  CheckedSize all;
   for (const Part& p : parts_)
     if (p.present) all += p.bytes();
-  return all;
+  return all.or_most();
 }
 
 void Layout::require_limits() const {
   const ContextInfo& context = request_.context;
   const auto passes = [&](const Part& p) {
     if (p.kind == HostTexture::Kind::buffer) return p.bytes() > context.max_buffer_bytes;
-    return std::max({p.size.x, p.size.y, p.size.z}) > context.max_3d_texture_size;
+    return std::max({p.size.x, p.size.y, p.size.z}) > context.max_3d_texture_size || p.bytes() > context.max_texture_bytes;
   };
   const Part* worst = nullptr;
   for (const Part& p : parts_)
@@ -118,8 +118,9 @@ void Layout::require_limits() const {
   const std::string sizes =
       worst->kind == HostTexture::Kind::buffer
           ? fmt::format("{} bytes; accepted by this context: a buffer of at most {}", worst->bytes(), context.max_buffer_bytes)
-          : fmt::format("{} x {} x {} texels; accepted by this context: a 3D texture of at most {} along an axis", worst->size.x,
-                        worst->size.y, worst->size.z, context.max_3d_texture_size);
+          : fmt::format("{} x {} x {} texels ({} bytes); accepted by this context: a 3D texture of at most {} along an axis{}",
+                        worst->size.x, worst->size.y, worst->size.z, worst->bytes(), context.max_3d_texture_size,
+                        context.has_texture_limit() ? fmt::format(" and {} bytes", context.max_texture_bytes) : "");
   throw UnsupportedError(
       fmt::format("encoding {} with {}: {}: {}{}", encoding_.name(), request_.parameters.dump(), worst->what, sizes, remedy_));
 }
