@@ -19,40 +19,20 @@ Position leave_region(IN(Ray) ray, IN(Region) r, IN(ray_real) t, IN(bvec3) throu
   return p;
 }
 
-// Where a mesh has gaps a region may begin behind one or end before one: isosurfaces need the sides there as well, from samples of no length
-// a little inside of the region.
-#define AMRTEX_GAPS (AMRTEX_ISOVALUES != 0 && AMRTEX_VALIDITY != 0)
-#define AMRTEX_INSIDE_REGION real(0.0009765625)
-
-// Intervals of a region that are sampled: where a ray's are moved the first and the last are parts of one.
-real interval_count(IN(real) count) { return AMRTEX_RAY_OFFSET != 0 ? count + real(1) : count; }
-
-// The interval of a region that is the i-th to be sampled (from 0.5 on): its middle and its length, in intervals. Before the first and behind the
-// last lie the region's ends.
+// The interval of a region that is the i-th to be sampled (from 0.5 on): its middle and its length, in intervals. Where a ray's
+// intervals are moved the first and the last of `count` + 1 are parts of one.
 vec2r interval_at(IN(real) i, IN(real) count, IN(real) phase) {
-  if (AMRTEX_GAPS && i < real(0)) return vec2r(AMRTEX_INSIDE_REGION, 0);
-  if (AMRTEX_GAPS && i > interval_count(count)) return vec2r(count - AMRTEX_INSIDE_REGION, 0);
   if (AMRTEX_RAY_OFFSET == 0) return vec2r(i, 1);
   real from = max(i - real(1.5) + phase, real(0));
   real to = min(i - real(0.5) + phase, count);
   return vec2r((from + to) * real(0.5), to - from);
 }
 
-// From interval middle `from` on: a ray that has no side yet takes one where it enters the region, ...
-real first_sample(IN(Accumulation) a, IN(real) from) {
-  return AMRTEX_GAPS && a.below < 0 && !a.probing && from < real(1) ? from - real(1) : from;
-}
-
-// ... and any takes one where it leaves it, before a gap may follow.
-real behind_last_sample(IN(Accumulation) a, IN(real) count) {
-  return interval_count(count) + real(AMRTEX_GAPS && !a.probing ? 1 : 0);
-}
-
 // What march_adaptive_region does, with the eight values of one octant at a time.
 real march_adaptive_cell(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(vec3r) dq, IN(real) count, IN(real) interval,
                          IN(ray_real) begin, IN(real) from, IN(real) phase) {
-  real i = first_sample(a, from);
-  real last = behind_last_sample(a, count);
+  real i = from;
+  real last = AMRTEX_RAY_OFFSET != 0 ? count + real(1) : count;
   vec2r part = interval_at(i, count, phase);
   vec3r q = q0 + dq * part.x;
   if (i < last) {
@@ -108,8 +88,8 @@ real march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(
   }
   if (AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_LEFT) q0 -= dq * real(0.5);
   if (AMRTEX_STENCILS) return march_adaptive_cell(a, r, q0, dq, count, interval, begin, from, phase);
-  real i = first_sample(a, from);
-  real last = behind_last_sample(a, count);
+  real i = from;
+  real last = AMRTEX_RAY_OFFSET != 0 ? count + real(1) : count;
   if (i < last) {
     do {
       vec2r part = interval_at(i, count, phase);
@@ -153,13 +133,16 @@ void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
       length = max((more ? next : ray.length) - t, ray_real(0));
       skipped = !inside || region_invisible(a, r);
       count_region(a, skipped);
-      if (skipped) pass_region(a, inside, r, next);
+      if (skipped) {
+        pass_region(a, inside, r, t, next, next);
+        front.part = part = real(0.5);
+      }
       t = next;
       bool x = exits.x <= min(exits.y, exits.z);
       bool y = !x && exits.y <= exits.z;
       p = leave_region(ray, r, t, bvec3(x, y, !x && !y));
       more = more && all(greaterThanEqual(p.cell, ivec3(0))) && all(lessThan(p.cell, u_domain_cells));
-    } while (skipped && more);
+    } while (skipped && more && !ray_stopped(a));
     if (AMRTEX_SKIPS_IN_STAGES && !skipped) open_region(r);
     vec3r f = vec3r(ray_vec3(front.p.cell - r.lower) + ray_vec3(front.p.fraction));  // as exact as the ray before it is rounded
     if (!skipped && length > ray_real(0)) front.part = march_adaptive_region(a, r, f, direction, real(length), front.t, part, ray.phase);

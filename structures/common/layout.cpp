@@ -13,9 +13,7 @@ double mebibytes(std::int64_t bytes) { return static_cast<double>(bytes) / 10485
 
 }  // namespace
 
-std::int64_t Part::texels() const {
-  return kind == HostTexture::Kind::buffer ? elements : Box{Vec3i(0), size}.cells();
-}
+std::int64_t Part::texels() const { return kind == HostTexture::Kind::buffer ? elements : Box{Vec3i(0), size}.cells(); }
 
 std::int64_t Part::bytes() const {
   const std::int64_t least = kind == HostTexture::Kind::buffer ? 1 : 0;

@@ -12,7 +12,8 @@
 
 namespace amrtex::pages {
 
-/// Whole ranges of pages are halved, then a divided page into its own. Ranges without mesh stay one leaf, in which nothing is drawn.
+/// Whole ranges of pages are halved, then a divided page into its own. Ranges without mesh stay one leaf, in which nothing is
+/// drawn.
 class PageDrawTree {
  public:
   PageDrawTree(const AmrHierarchy& h, const Division& division, const std::vector<Page>& pages)

@@ -94,9 +94,7 @@ class Division {
   }
 
  private:
-  static bool stands_before(const Vec3i& a, const Vec3i& b) {
-    return std::tie(a.z, a.y, a.x) < std::tie(b.z, b.y, b.x);
-  }
+  static bool stands_before(const Vec3i& a, const Vec3i& b) { return std::tie(a.z, a.y, a.x) < std::tie(b.z, b.y, b.x); }
   static void sort_once(PageList& list) {
     std::sort(list.begin(), list.end(), stands_before);
     list.erase(std::unique(list.begin(), list.end()), list.end());

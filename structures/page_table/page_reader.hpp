@@ -130,7 +130,8 @@ inline void classify(PageReader& reader, const BuildRequest& request, const Hidd
   if (page.kind == AMRTEX_PAGE_CONSTANT) page.green = std::bit_cast<std::uint32_t>(static_cast<float>(c.range.min));
 }
 
-/// Is a page stored, as two of its values alone tell? Two that differ make no constant; where several fields are drawn no page is one.
+/// Is a page stored, as two of its values alone tell? Two that differ make no constant; where several fields are drawn no page is
+/// one.
 class SurelyStored {
  public:
   SurelyStored(const AmrHierarchy& h, const BuildRequest& request, const Options& o) : h_(h), request_(request), options_(o) {}
@@ -144,7 +145,8 @@ class SurelyStored {
       const double a = h_.level_value(page.level, inside.lower, field);
       const double b = h_.level_value(page.level, inside.upper - Vec3i(1), field);
       if (request_.field_count() > 1 && !(std::isnan(a) && std::isnan(b))) return true;
-      if (request_.field_count() == 1 && !std::isnan(a) && !std::isnan(b) && a != b) return !options_.nodes || vertices_differ(page);
+      if (request_.field_count() == 1 && !std::isnan(a) && !std::isnan(b) && a != b)
+        return !options_.nodes || vertices_differ(page);
     }
     return false;
   }

@@ -22,11 +22,11 @@ inline constexpr std::int64_t kSmallTableBytes = std::int64_t{32} << 20;
 
 /// The table: entries of the finest pages' size in one level or two, or a tree of tables.
 struct TablePlan {
-  int entry_width = 1;  ///< of the first level, finest cells
-  Vec3i top{1};         ///< entries of the first level
-  int top_level = 0;    ///< two levels: whose pages have one entry each in the first
-  int finest_level = 0; ///< of any page
-  int sub_edge = 1;     ///< two levels: entries along the edge of a sub-table
+  int entry_width = 1;   ///< of the first level, finest cells
+  Vec3i top{1};          ///< entries of the first level
+  int top_level = 0;     ///< two levels: whose pages have one entry each in the first
+  int finest_level = 0;  ///< of any page
+  int sub_edge = 1;      ///< two levels: entries along the edge of a sub-table
   std::int64_t subtables = 0;
   PoolLayout sub_layout;
   std::optional<TableTree> tree;
@@ -86,7 +86,8 @@ class TablePlanner {
   /// Entries along each axis, one a page of a level, while ints hold them and the widths of pages.
   std::optional<Vec3i> entries_along(int level) const {
     if (std::int64_t{division_.page_size()} * hierarchy_.cell_width(level) > std::numeric_limits<int>::max()) return std::nullopt;
-    const Vec3d n = Vec3d(division_.pages_along(0)) * static_cast<double>(hierarchy_.cell_width(0) / hierarchy_.cell_width(level));
+    const Vec3d n =
+        Vec3d(division_.pages_along(0)) * static_cast<double>(hierarchy_.cell_width(0) / hierarchy_.cell_width(level));
     return std::max({n.x, n.y, n.z}) <= limit() ? std::optional(Vec3i(n)) : std::nullopt;
   }
   TablePlan with_top(int level, const Vec3i& top) const {
@@ -142,8 +143,8 @@ class TablePlanner {
   }
 
   [[noreturn]] void refuse() const {
-    const Vec3d one = Vec3d(division_.pages_along(0)) *
-                      static_cast<double>(hierarchy_.cell_width(0) / hierarchy_.cell_width(finest_));
+    const Vec3d one =
+        Vec3d(division_.pages_along(0)) * static_cast<double>(hierarchy_.cell_width(0) / hierarchy_.cell_width(finest_));
     throw UnsupportedError(
         fmt::format("encoding page_table with page_size {}: a table of {:.0f} x {:.0f} x {:.0f} entries, and no split in levels "
                     "fits a 3D texture of {} texels an axis and a buffer of {} bytes; a larger page_size needs fewer entries",

@@ -59,11 +59,12 @@ inline std::vector<int> entry_widths(const AmrHierarchy& h, int page_size, int f
 
 class TableTree {
  public:
-  /// Tables for these pages; nullopt where no first level fits a texture of `limit` texels an axis.
-  static std::optional<TableTree> over(const AmrHierarchy& h, const Division& division, const std::vector<Page>& pages,
-                                       int limit) {
+  /// Tables for these pages, of which the first has at most `most_top` entries, where the ratios let it be that few; nullopt
+  /// where it does not fit a texture of `limit` texels an axis.
+  static std::optional<TableTree> over(const AmrHierarchy& h, const Division& division, const std::vector<Page>& pages, int limit,
+                                       std::int64_t most_top = kMostTopEntries) {
     TableTree tree(h, division.page_size());
-    if (!tree.choose_stages(entry_widths(h, division.page_size(), division.finest_level()), limit)) return std::nullopt;
+    if (!tree.choose_stages(entry_widths(h, division.page_size(), division.finest_level()), limit, most_top)) return std::nullopt;
     for (const Page& page : pages) tree.add_tables_above(page);
     return tree;
   }
@@ -114,9 +115,9 @@ class TableTree {
   Vec3i entries_along(int width) const { return ceil_div(hierarchy_->cells(hierarchy_->finest_level()), width); }
 
   /// The first level: of the smallest entries of which it has few enough. From there on steps of at most kSubtableEdge.
-  bool choose_stages(const std::vector<int>& widths, int limit) {
+  bool choose_stages(const std::vector<int>& widths, int limit, std::int64_t most_top) {
     std::size_t i = 0;
-    while (i + 1 < widths.size() && Box{Vec3i(0), entries_along(widths[i])}.cells() > kMostTopEntries) ++i;
+    while (i + 1 < widths.size() && Box{Vec3i(0), entries_along(widths[i])}.cells() > most_top) ++i;
     top_ = entries_along(widths[i]);
     stages_.push_back({.width = widths[i], .edge = 0});
     while (i > 0) {

@@ -143,8 +143,8 @@ inline void write_tree(const TablePlan& plan, const std::vector<Page>& pages, En
   HostTexture* nodes = field.find("page_nodes");
   const auto write = [&](std::size_t stage, std::int64_t first, const Box& table, const Vec3i& at, const Entry& entry) {
     if (stage == 0) return write_entry(top, at, entry);
-    std::uint32_t* words = nodes->as<std::uint32_t>() +
-                           plan.entry_words() * (first + static_cast<std::int64_t>(table.offset(at)));
+    std::uint32_t* words =
+        nodes->as<std::uint32_t>() + plan.entry_words() * (first + static_cast<std::int64_t>(table.offset(at)));
     words[0] = entry.red;
     if (plan.green) words[1] = entry.green;
   };
