@@ -539,7 +539,7 @@ PoolError hardware_error(const AmrHierarchy& h, const Json& parameters) {
   const auto got = probe_on_gl(gl, h, Structure(gl, field), at);
   const Values expected = reference_values(h, field.definition, at);
   PoolError error;
-  error.bound = 12 * 0x1p-24 * std::max({pool.x, pool.y, pool.z});
+  error.bound = 3 * 2 * 4 * 0x1p-24 * std::max({pool.x, pool.y, pool.z});  // README.md, three axes
   for (std::size_t i = 0; i < at.size(); ++i) {
     if (!expected[i]) continue;
     // what float arithmetic loses is no matter of the texture unit

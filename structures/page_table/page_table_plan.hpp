@@ -18,7 +18,7 @@ namespace amrtex::pages {
 /// One-level tables stay below this.
 inline constexpr std::int64_t kMaxTableBytes = std::int64_t{256} << 20;
 /// A table up to this, or up to what its pages would take, has as few levels as fit: fewer look-ups are worth it.
-inline constexpr std::int64_t kSmallTableBytes = std::int64_t{32} << 20;
+inline constexpr std::int64_t kSmallTableBytes = std::int64_t{4} << 20;
 
 /// The table: entries of the finest pages' size in one level or two, or a tree of tables.
 struct TablePlan {

@@ -189,19 +189,19 @@ TEST(TableTree, OrdinaryMeshesKeepTheirTable) {
   const EncodedField field = build(h, page_case(Filter::linear_page, 4));
   EXPECT_EQ(field.statistics["table_levels"], 1);
   EXPECT_EQ(field.find("page_nodes"), nullptr);
-  // 128^3 entries of 8 bytes: as many as fit, where the context takes them
+  // root cells 16^3, the corner's 8^3 refined by 2^5: 128^3 entries of 8 bytes are 16 MiB, the pages of 64 cells less than 1 MiB
   const AmrHierarchy fine =
       MeshBuilder(Vec3i(16), std::vector<int>(5, 2)).root(waves).patch(5, {Vec3i(0), Vec3i(32)}, waves).hierarchy();
-  EXPECT_EQ(build(fine, page_case(Filter::nearest, 4)).statistics["table_levels"], 1);
-  ContextInfo narrow;
-  narrow.max_3d_texture_size = 127;
-  const EncodedField two = build(fine, page_case(Filter::nearest, 4), {.limits = narrow});
-  EXPECT_EQ(two.statistics["table_levels"], 2);
-  EXPECT_EQ(define(two, "AMRTEX_PAGE_TABLE_TREE"), 0);
-  const auto positions = probe_positions(fine, 30);
-  const Comparison result =
-      compare_double(fine, build(fine, page_case(Filter::nearest, 4), {.storage = Storage::r64f, .limits = narrow}), positions);
-  EXPECT_TRUE(result) << result;
+  for (const int limit : {2048, 127}) {  // the context would take one level, or would not
+    ContextInfo context;
+    context.max_3d_texture_size = limit;
+    const EncodedField two = build(fine, page_case(Filter::nearest, 4), {.storage = Storage::r64f, .limits = context});
+    EXPECT_EQ(two.statistics["table_levels"], 2);
+    EXPECT_EQ(define(two, "AMRTEX_PAGE_TABLE_TREE"), 0);
+    EXPECT_NE(two.find("tex_page_subtables"), nullptr);
+    const Comparison result = compare_double(fine, two, probe_positions(fine, 30));
+    EXPECT_TRUE(result) << result;
+  }
 }
 
 // ---- refusals ----
