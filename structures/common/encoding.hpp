@@ -31,13 +31,15 @@ Filtering parse_filtering(std::string_view name);
 /// What a GL context offers, as far as encodings care. The defaults are "no limit known".
 struct ContextInfo {
   std::string renderer, version, vendor;
-  int max_3d_texture_size = 2048;                         ///< texels along an axis
-  std::int64_t max_buffer_bytes = std::int64_t{1} << 27;  ///< of one shader storage block
-  bool bindless_texture = true;                           ///< textures by handles; without a context they are fetched on the CPU
+  int max_3d_texture_size = 2048;                                             ///< texels along an axis
+  std::int64_t max_texture_bytes = std::numeric_limits<std::int64_t>::max();  ///< of one 3D texture
+  std::int64_t max_buffer_bytes = std::int64_t{1} << 27;                      ///< of one shader storage block
+  bool bindless_texture = true;  ///< textures by handles; without a context they are fetched on the CPU
   bool shader_ballot = true;
   bool handles_may_differ = false;  ///< in one fetch, between invocations that run together; else each is served in turn
   std::int64_t max_resident_handles = std::numeric_limits<std::int64_t>::max();  ///< textures reached by handles at a time
   std::vector<std::string> extensions;
+  bool has_texture_limit() const { return max_texture_bytes != std::numeric_limits<std::int64_t>::max(); }
   bool has_handle_limit() const { return max_resident_handles != std::numeric_limits<std::int64_t>::max(); }
 };
 

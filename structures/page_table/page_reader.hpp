@@ -2,10 +2,12 @@
 #pragma once
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -131,6 +133,60 @@ inline void classify(PageReader& reader, const BuildRequest& request, const Hidd
                                                            : AMRTEX_PAGE_STORED;
   if (page.kind == AMRTEX_PAGE_CONSTANT)
     page.green = std::bit_cast<std::uint32_t>(static_cast<float>(is_hidden.units().number(c.range.min)));
+}
+
+/// Is a page stored, as two of its values alone tell? Two that differ make no constant; where several fields are drawn no page is
+/// one.
+class SurelyStored {
+ public:
+  SurelyStored(const AmrHierarchy& h, const BuildRequest& request, const Options& o) : h_(h), request_(request), options_(o) {}
+
+  bool operator()(const Page& page) const {
+    if (!request_.needs.invisible.empty()) return false;  // it may be hidden
+    const Vec3i first = page.index_in_level * options_.page_size;
+    const Box inside = intersection(Box{first, first + Vec3i(options_.page_size)}, h_.domain(page.level));
+    for (int number = 0; number < request_.field_count(); ++number) {
+      const int field = request_.field_at(number);
+      const double a = h_.level_value(page.level, inside.lower, field);
+      const double b = h_.level_value(page.level, inside.upper - Vec3i(1), field);
+      if (request_.field_count() > 1 && !(std::isnan(a) && std::isnan(b))) return true;
+      if (request_.field_count() == 1 && !std::isnan(a) && !std::isnan(b) && a != b)
+        return !options_.nodes || vertices_differ(page);
+    }
+    return false;
+  }
+
+ private:
+  /// The means of cells that differ may be equal.
+  bool vertices_differ(const Page& page) const {
+    const Vec3i lower = page.index_in_level * options_.page_size;
+    const auto at = [&](const Vec3i& vertex) {
+      double value = 0;
+      vertex_values(h_, request_.field, page.level, {vertex, vertex + Vec3i(1)}, {&value, 1});
+      return value;
+    };
+    return at(lower) != at(lower + Vec3i(options_.page_size));
+  }
+
+  const AmrHierarchy& h_;
+  const BuildRequest& request_;
+  const Options& options_;
+};
+
+/// How many pages are surely stored; counting ends beyond `enough`, in whole blocks of pages, so that the number is the same at
+/// each run.
+inline std::int64_t count_surely_stored(const SurelyStored& is_stored, const std::vector<Page>& pages, std::int64_t enough) {
+  constexpr std::size_t kBlock = 1 << 14;
+  std::int64_t stored = 0;
+  for (std::size_t first = 0; first < pages.size() && stored <= enough; first += kBlock)
+    stored += tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(first, std::min(first + kBlock, pages.size()), 64), std::int64_t{0},
+        [&](const auto& range, std::int64_t sum) {
+          for (std::size_t i = range.begin(); i != range.end(); ++i) sum += is_stored(pages[i]) ? 1 : 0;
+          return sum;
+        },
+        std::plus<>());
+  return stored;
 }
 
 /// Reads every page to learn what is absent or constant, then numbers the stored ones.
