@@ -12,6 +12,7 @@
 #include "bench/measure/environment.hpp"
 #include "bench/measure/error_split.hpp"
 #include "bench/measure/left_out_time.hpp"
+#include "bench/measure/reference_cache.hpp"
 #include "bench/measure/shader_cache.hpp"
 #include "bench/numbers/image_error.hpp"
 #include "bench/numbers/statistics.hpp"
@@ -294,22 +295,26 @@ class Runner {
     const ReferenceSettings& reference = *experiment_.reference;
     const Scene judge = judged(scene);
     const fs::path cache = options_.folder / "references";
+    const auto asked = [&](const FilterDefinition& filter) {
+      return ReferenceRequest{*mesh_, exact_data_hash(*mesh_, judge), filter, judge, reference.rule()};
+    };
     std::string hash;
     if (reference.common_filter) {
       FilterDefinition common{*reference.common_filter, 0, mesh_->finest_level()};
       if (!common.has_pages()) common.page_level = 0;
-      const Picture shared = cached_reference(*mesh_, common, judge, reference.step, cache, hash);
+      const Picture shared = cached_reference(asked(common), cache, hash).picture;
       record["error_common"] = error_json(compare(picture, shared), hash);
       record["error_common"]["p95"] = percentile(pixel_errors(picture, shared), 0.95);
       record["error_common"]["p95_seen"] = percentile(seen_errors(picture, shared), 0.95);
       record["error_common"]["filter"] = filter_name(common.filter);
     }
     if (!reference.own) return std::nullopt;
-    Picture own = cached_reference(*mesh_, built.structure.field.definition, judge, reference.step, cache, hash);
+    ReferencePicture drawn = cached_reference(asked(built.structure.field.definition), cache, hash);
+    Picture& own = drawn.picture;
     const ErrorMetrics error = compare(picture, own);
     record["error"] = error_json(error, hash);
-    for (const char* unknown : {"reference_error", "limited_by_reference", "within_tolerance_seen"})
-      record["error"][unknown] = nullptr;
+    record["error"]["within_tolerance_seen"] = nullptr;
+    add_reference_error(record["error"], drawn, error);
     record["error"]["split"] = experiment_.explain_error ? explain(built, scene, own, picture) : Json();
     if (!experiment_.explain_error && scene.settings.prunes_levels())
       record["error"]["split"]["level_of_detail"] = pruning_error(built, scene, picture);
@@ -343,9 +348,9 @@ class Runner {
   /// The error by cause.
   Json explain(const Built& built, const Scene& scene, const Picture& reference, const Picture& picture) {
     const auto truth = analytic_field(experiment_.datasets[loaded_]);
-    const double step = experiment_.reference->step;
     const Encoding& encoding = find_encoding(built.structure.field.encoding);
-    return split_json(split_error({*mesh_, encoding, built.structure, *context_, scene, reference, picture, step, truth.get()}));
+    return split_json(split_error(
+        {*mesh_, encoding, built.structure, *context_, scene, reference, picture, experiment_.reference->rule(), truth.get()}));
   }
 
   /// What the level of detail did: the picture against that of the same structure without it.
@@ -566,22 +571,6 @@ std::vector<std::string> scene_warnings(const AmrHierarchy& hierarchy, const Sce
       warnings.push_back(fmt::format("isovalue {} lies outside the range of {}, {} to {}: it has no surface", isovalue,
                                      hierarchy.fields().front(), range.min, range.max));
   return warnings;
-}
-
-Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definition, const Scene& scene, double step,
-                         const fs::path& folder, std::string& hash) {
-  Json key = {{"scene", scene_reference(scene)}, {"data", exact_data_hash(hierarchy, scene)}};
-  key["filter"] = filter_name(definition.filter);
-  key["page"] = {definition.page_size, definition.page_level};
-  key["step"] = step;
-  key["method"] = 1;
-  hash = configuration_hash(key);
-  const fs::path path = folder / (hash + ".npy");
-  if (fs::exists(path)) return read_npy(path);
-  const Picture picture = HierarchyReference(hierarchy, 0, definition).render(scene, step);
-  fs::create_directories(folder);
-  write_npy(picture, path, true);
-  return picture;
 }
 
 RunSummary run_experiment(const Experiment& experiment, const RunOptions& options) {

@@ -56,11 +56,6 @@ std::string exact_data_hash(const AmrHierarchy& hierarchy, const Scene& scene);
 /// What is legal about a scene of field 0 of this mesh, and yet likely not meant.
 std::vector<std::string> scene_warnings(const AmrHierarchy& hierarchy, const Scene& scene);
 
-/// The picture of the scene by the double reference of `definition`, from the cache
-/// below `folder` where it was drawn before. `hash` receives the name of that file.
-Picture cached_reference(const AmrHierarchy& hierarchy, FilterDefinition definition, const Scene& scene, double step,
-                         const std::filesystem::path& folder, std::string& hash);
-
 /// Frame times through Google Benchmark with manual time: `warm_up` frames are dropped.
 std::vector<FrameTime> time_frames(Consumer& consumer, int warm_up, int frames);
 
