@@ -192,7 +192,7 @@ Cost draw_light(ReferenceTracer& tracer, const std::vector<RayPart>& parts, cons
   LightIntegral light(rule_of(drawing, parts), drawing.table, std::move(lamp));
   trace(tracer, parts, drawing, [&](const PieceFunction& f, double from, double to) {
     light.add(f, {from, to});
-    return light.transmittance() >= LightIntegral::kOpaque;
+    return !light.opaque();
   });
   return write_light(light, pixel);
 }

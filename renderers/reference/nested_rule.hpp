@@ -24,7 +24,7 @@ struct NestedRule {
   static constexpr std::size_t index(std::size_t k) { return (k + 1) * ((kNestedPlaces + 1) / (N + 1)) - 1; }
 };
 
-namespace nested {
+namespace nested_rule {
 
 inline constexpr std::array<double, kNestedPlaces> kPlaces{
     0.0030840183936224888957, 0.019754365645989858288, 0.055770383563871500555, 0.11270166537925831148,
@@ -62,16 +62,16 @@ constexpr NestedRule<N> make(const std::array<double, N>& weights) {
   return rule;
 }
 
-}  // namespace nested
+}  // namespace nested_rule
 
 template <std::size_t N>
 inline constexpr NestedRule<N> kNestedRule = [] {
   if constexpr (N == 3)
-    return nested::make<3>(nested::kWeights3);
+    return nested_rule::make<3>(nested_rule::kWeights3);
   else if constexpr (N == 7)
-    return nested::make<7>(nested::kWeights7);
+    return nested_rule::make<7>(nested_rule::kWeights7);
   else
-    return nested::make<15>(nested::kWeights15);
+    return nested_rule::make<15>(nested_rule::kWeights15);
 }();
 
 }  // namespace amrtex

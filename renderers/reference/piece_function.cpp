@@ -34,7 +34,7 @@ double nested_mean(const std::array<double, kNestedPlaces>& values) {
 /// Adds the mean of a quotient's rise from a to b times b - a. `most`: error allowed for a length of 1.
 void add_mean(const PieceFunction& f, double a, double b, double most, int halvings, Mean& mean) {
   std::array<double, kNestedPlaces> values{};
-  for (std::size_t k = 0; k < kNestedPlaces; ++k) values[k] = f.rise(a + (b - a) * nested::kPlaces[k]);
+  for (std::size_t k = 0; k < kNestedPlaces; ++k) values[k] = f.rise(a + (b - a) * nested_rule::kPlaces[k]);
   mean.evaluations += static_cast<std::int64_t>(kNestedPlaces);
   const double fine = nested_mean<15>(values);
   const double off = std::abs(fine - nested_mean<7>(values));
@@ -92,7 +92,8 @@ double root_between(const Cubic& f, double a, double b) {
     ((v < 0) == rising ? a : b) = s;
     const double slope = f.c[1] + s * (2 * f.c[2] + s * 3 * f.c[3]);
     double next = s - v / slope;
-    if (!(next > a && next < b)) next = a > 0 && b > 16 * a ? std::sqrt(a) * std::sqrt(b) : (a + b) / 2;
+    if (!(next > a && next < b)) next = -f.c[0] / (f.c[1] + s * (f.c[2] + s * f.c[3]));  // of the chord from 0
+    if (!(next > a && next < b)) next = (a + b) / 2;
     if (std::abs(next - s) <= 2 * kEpsilon * next) return next;
     s = next;
   }

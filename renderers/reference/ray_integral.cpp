@@ -17,11 +17,12 @@ constexpr double kThin = 0.25;  // optical depth of a part that is never split f
 
 // ---- the rule with a tolerance ----
 
-constexpr double kDeepest = 8;      // optical depth of a part: no rule sees an exponential that falls faster
+constexpr double kDeepest = 10;     // optical depth of a part: no rule sees an exponential that falls faster
 constexpr double kPurseShare = 64;  // part of the purse that one place may take
 constexpr double kSteep = 16;       // growth of the field, over which a logarithm is split beside its steep end
 constexpr double kTooSteep = 64;    // over which it is not even tried
 constexpr double kSteepShare = 1.0 / 8;
+constexpr double kFall = 16;      // of the ratio of two differences, which is the worst that the next one falls by
 constexpr double kSquares = 8;    // each set of places leaves about the square of what the set before leaves, times this
 constexpr int kHalvings = 2000;   // of one stretch, in the worst case; what is off then is in the estimate
 constexpr int kLitHalvings = 64;  // where each place traces a ray to a lamp
@@ -82,6 +83,12 @@ double difference(const LightSums& a, const LightSums& b) {
   return difference(a.excess, b.excess) + std::exp(-std::max(std::min(a.depth, b.depth), 0.0)) * std::abs(a.depth - b.depth);
 }
 
+/// What two sets of places differ by is the error of the smaller. That of the larger is less, by a part of how the difference to
+/// the set before fell.
+double surely(double difference, double before) {
+  return before > 0 ? difference * std::min(1.0, kFall * difference / before) : difference;
+}
+
 }  // namespace
 
 void LightIntegral::add(const PieceFunction& f, const RaySpan& piece, double first, double last) {
@@ -89,6 +96,7 @@ void LightIntegral::add(const PieceFunction& f, const RaySpan& piece, double fir
   const std::size_t low = table_->segment_of(f.lower);
   const std::size_t high = table_->segment_of(f.upper);
   if (!table_->visible(low, high)) return;
+  joins_ = true;
   breaks_.assign({first, last});
   const auto break_at = [&](double s) {
     if (s > first && s < last) breaks_.push_back(s);
@@ -122,12 +130,12 @@ void LightIntegral::add_interval(const PieceFunction& f, const RaySpan& piece, d
   if (!arriving_ && (segment.constant || (segment.one_color && !table_->logarithmic() && !f.rational)))
     add_exact(stretch, first, last);
   else
-    add_smooth(stretch, first, last);
+    add_stretch(stretch, first, last);
 }
 
 /// Two Gauss points integrate a cubic extinction exactly, and of one colour nothing else is needed.
 void LightIntegral::add_exact(const Stretch& stretch, double first, double last) {
-  if (transmittance_ < kOpaque) return;
+  if (opaque()) return;
   const double middle = (first + last) / 2;
   const double offset = (last - first) / (2 * kSqrt3);
   const TransferTable::Light a = evaluate(stretch, middle - offset);
@@ -142,6 +150,11 @@ void LightIntegral::add_exact(const Stretch& stretch, double first, double last)
 }
 
 void LightIntegral::add_smooth(const Stretch& stretch, double first, double last) {
+  joins_ = true;
+  add_stretch(stretch, first, last);
+}
+
+void LightIntegral::add_stretch(const Stretch& stretch, double first, double last) {
   if (rule_.part == 0) {
     halvings_ = arriving_ ? kLitHalvings : kHalvings;
     add_within(stretch, first, last);
@@ -157,7 +170,7 @@ void LightIntegral::add_smooth(const Stretch& stretch, double first, double last
 /// One part, or where it is longer than wanted its halves, as long as it is not thin: in a cell
 /// thousands of the finest wide, f is one cubic, and most of its parts would only cost time.
 void LightIntegral::add_parts(const Stretch& stretch, double middle, double width) {
-  if (transmittance_ < kOpaque) return;
+  if (opaque()) return;
   const double offset = width / (2 * kSqrt3);
   const double length = width * stretch.span().length();
   const TransferTable::Light first = evaluate(stretch, middle - offset);
@@ -189,7 +202,7 @@ void LightIntegral::add_part(const TransferTable::Light& first, const TransferTa
 /// One part where two rules of it agree, else two, front to back.
 void LightIntegral::add_within(const Stretch& stretch, double first, double last) {
   LightSamples samples;
-  while (transmittance_ >= kOpaque) {
+  while (!opaque()) {
     const double length = (last - first) * stretch.span().length();
     const double most = transmittance_ * stretch.most() * length;  // that this can add
     const double growth = stretch.growth(first, last);
@@ -213,7 +226,7 @@ void LightIntegral::add_within(const Stretch& stretch, double first, double last
           take(stretch, first, last, 0, samples);
           const LightSums before = sums;
           sums = sum_light<15>(samples);
-          off = std::min(transmittance_ * difference(sums, before), most);
+          off = std::min(surely(transmittance_ * difference(sums, before), off), most);
         }
         if (!splits || enough(off, sums, length)) {
           spend(off, sums, length);
@@ -233,7 +246,7 @@ void LightIntegral::add_within(const Stretch& stretch, double first, double last
 void LightIntegral::take(const Stretch& stretch, double first, double last, std::size_t begin, LightSamples& samples) {
   const double length = (last - first) * stretch.span().length();
   for (std::size_t k = begin; k < kNestedPlaces; k += 2) {
-    const TransferTable::Light light = evaluate(stretch, first + nested::kPlaces[k] * (last - first));
+    const TransferTable::Light light = evaluate(stretch, first + nested_rule::kPlaces[k] * (last - first));
     samples.depth[k] = light.extinction * length;
     samples.rgb[k] = light.rgb;
   }
@@ -254,7 +267,8 @@ void LightIntegral::spend(double off, const LightSums& sums, double length) {
   if (off <= purse_ / kPurseShare && off > share(sums, length)) purse_ -= off;
 }
 
-/// A face or a knot lies where doubles say it lies: a layer of that thickness may be of the part before, or missing.
+/// A face or a knot lies where doubles say it lies: a layer of that thickness may be too much or missing, and at a face it may be
+/// of the piece before. Light is continuous at knots.
 void LightIntegral::commit(const LightSums& sums, const Vec3d& base, double off, const Stretch& stretch) {
   const double depth = std::max(sums.depth, 0.0);
   const double before = transmittance_;
@@ -263,7 +277,9 @@ void LightIntegral::commit(const LightSums& sums, const Vec3d& base, double off,
   transmittance_ = passed_ * std::exp(-depth_);
   const double layer = kRoundings * kEpsilon * std::max(std::abs(stretch.span().from), std::abs(stretch.span().to));
   const double taken = std::min(1.0, stretch.most() * layer);
-  error_ += off + taken * transmittance_ + std::min(taken, taken_before_) * before * stretch.color_range();
+  error_ += off + taken * transmittance_;
+  if (joins_) error_ += std::min(taken, taken_before_) * before * stretch.color_range();
+  joins_ = false;
   taken_before_ = taken;
 }
 

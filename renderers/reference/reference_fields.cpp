@@ -93,7 +93,7 @@ void FieldsLight::drain(LightIntegral& light) {
     for (const Piece& p : pieces) places_.insert(places_.end(), {p.span.from, p.span.to});
   sort_places(places_);
   std::vector<std::size_t> next(pieces_.size());  // of each field, the first piece that does not end before the stretch
-  for (std::size_t k = 0; k + 1 < places_.size() && light.transmittance() >= LightIntegral::kOpaque; ++k) {
+  for (std::size_t k = 0; k + 1 < places_.size() && !light.opaque(); ++k) {
     const double from = places_[k];
     const double to = places_[k + 1];
     Pieces here(pieces_.size());

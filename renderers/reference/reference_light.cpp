@@ -48,7 +48,7 @@ double LampTracer::light_at(const Vec3d& p) {
   LightIntegral shade({scene_.rule.part, scene_.rule.tolerance, end}, &scene_.table);
   tracer_.trace(ray, end, [&](const PieceFunction& f, double from, double to) {
     shade.add(f, {from, to});
-    return shade.transmittance() >= LightIntegral::kOpaque;
+    return !shade.opaque();
   });
   error_ = std::max(error_, (1 - scene_.ambient) * shade.error());
   evaluations_ += shade.evaluations();

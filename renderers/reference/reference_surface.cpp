@@ -125,20 +125,20 @@ SurfacePainter::Cost SurfacePainter::draw_color(ReferenceTracer& tracer, const s
   LightIntegral light({scene_.rule.part, scene_.rule.tolerance, way}, scene_.volume, lamp);
   SurfaceFinder finder(surfaces.values, kJoint * way);
   for (const RayPart& part : parts) {
-    if (light.transmittance() < LightIntegral::kOpaque) break;
+    if (light.opaque()) break;
     tracer.trace(part.ray, part.length, [&](const PieceFunction& f, double from, double to) {
       double behind = 0;  // the last crossing
       for (const Crossing& c : finder.next(f, part.start + from, part.start + to)) {
         light.add(f, {from, to}, behind, c.s);
         behind = c.s;
-        if (light.transmittance() < LightIntegral::kOpaque) return false;
+        if (light.opaque()) return false;
         const double t = from + c.s * (to - from);
         const Vec3d p = point_of(tracer, part.ray, t, c.s);
         const Vec3d rgb = color_at(p, c.surface, part.direction) * (lamp ? lamp(t) : 1.0);
         light.add_surface(rgb, surfaces.opacity.empty() ? 1 : surfaces.opacity[c.surface]);
       }
       light.add(f, {from, to}, behind);
-      return light.transmittance() >= LightIntegral::kOpaque;
+      return !light.opaque();
     });
   }
   for (int c = 0; c < 3; ++c) pixel[c] = light.color()[c];

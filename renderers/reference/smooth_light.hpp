@@ -65,7 +65,8 @@ LightSums sum_light(const LightSamples& samples) {
   for (std::size_t i = 0; i < N; ++i) {
     double before = 0;
     for (std::size_t j = 0; j < N; ++j) before += rule.before[i][j] * samples.depth[rule.index(j)];
-    const double emitted = rule.weight[i] * samples.depth[rule.index(i)] * std::exp(-before);
+    // where extinction jumps by decades the polynomial swings below 0
+    const double emitted = rule.weight[i] * samples.depth[rule.index(i)] * std::exp(-std::max(before, 0.0));
     const Vec3d other = samples.rgb[rule.index(i)] - base;
     sums.excess += emitted * other;
     sums.spread += std::abs(emitted) * std::max({std::abs(other.x), std::abs(other.y), std::abs(other.z)});
