@@ -13,6 +13,7 @@
 #include "bench/measure/reference_cache.hpp"
 #include "bench/measure/runner.hpp"
 #include "bench/settings/experiment.hpp"
+#include "bench/verify/stiff_media.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
 #include "renderers/reference/nested_rule.hpp"
 #include "renderers/reference/piece_function.hpp"
@@ -107,111 +108,11 @@ TEST(Pieces, ASmallRiseOnALargeBaseKeepsItsDigits) {
 
 // ---- stiff media in closed form ----
 
-constexpr double kFrom = 0.125, kTo = 0.875, kWay = kTo - kFrom;  // between the outer centres of 4 cells f = x exactly
-
-/// A medium over f = x, and what a ray through it from kFrom to kTo must be.
-struct Medium {
-  std::string name;
-  TransferFunction tf;
-  double color, opacity;
-};
-
-TransferFunction curve(std::vector<TransferFunction::ExtinctionPoint> extinction, double dark, double bright,
-                       bool logarithmic = false) {
-  TransferFunction tf;
-  tf.extinction = std::move(extinction);
-  tf.color = {{dark, Vec3d(0)}, {bright, Vec3d(1)}};
-  tf.logarithmic = logarithmic;
-  return tf;
-}
-
-/// Dawson's integral exp(-x^2) int_0^x exp(t^2) dt (G. B. Rybicki, Computers in Physics 3, 1989; off by exp(-61) at this width).
-double dawson(double x) {
-  constexpr double kWidth = 0.2;
-  const double n0 = 2 * std::round(0.5 * x / kWidth);
-  double sum = 0;
-  for (int k = -61; k <= 61; k += 2) {
-    const double away = x - (n0 + k) * kWidth;
-    sum += std::exp(-away * away) / (n0 + k);
-  }
-  return sum / std::sqrt(std::numbers::pi);
-}
-
-/// k = K u / w, c = u / w on [0, w]: C = 1/w (sqrt(pi / 2a) erf(w sqrt(a / 2)) - w exp(-a w^2 / 2)), a = K / w.
-double rising(double k, double w) {
-  const double a = k / w;
-  return std::sqrt(std::numbers::pi / (2 * a)) * std::erf(w * std::sqrt(a / 2)) / w - std::exp(-a * w * w / 2);
-}
-/// k = K (1 - u / w), c = u / w on [0, w]: C = 1/w sqrt(2 / a) D(w sqrt(a / 2)) - exp(-a w^2 / 2), D Dawson's integral.
-double falling(double k, double w) {
-  const double a = k / w;
-  return std::sqrt(2 / a) * dawson(w * std::sqrt(a / 2)) / w - std::exp(-a * w * w / 2);
-}
-/// k = K, c = u / w on [0, w]: C = (1 - exp(-K w) (1 + K w)) / (K w).
-double level(double k, double w) { return (1 - std::exp(-k * w) * (1 + k * w)) / (k * w); }
-
-Medium ramp(double k) { return {"ramp", curve({{kFrom, 0}, {kTo, k}}, kFrom, kTo), rising(k, kWay), -std::expm1(-k * kWay / 2)}; }
-Medium falling_ramp(double k) {
-  return {"falling ramp", curve({{kFrom, k}, {kTo, 0}}, kFrom, kTo), falling(k, kWay), -std::expm1(-k * kWay / 2)};
-}
-Medium constant_medium(double k) { return {"constant", curve({{0, k}}, kFrom, kTo), level(k, kWay), -std::expm1(-k * kWay)}; }
-/// Nothing before x = 0.55, k behind; colours rise all along.
-Medium step_medium(double k) {
-  const double at = 0.55;
-  const double behind = kTo - at;
-  const double a = -std::expm1(-k * behind);
-  return {"step", curve({{at, 0}, {std::nextafter(at, 1.0), k}}, kFrom, kTo),
-          (at - kFrom) / kWay * a + behind / kWay * level(k, behind), a};
-}
-/// A triangle of half width w around x = 0.55; colours rise across it: 0 to 1/2 on its first half.
-Medium peak(double k, double w) {
-  const double at = 0.55;
-  const double through = std::exp(-k * w / 2);
-  const double behind = 0.5 * (1 - through) + 0.5 * falling(k, w);
-  return {fmt::format("peak of half width {}", w), curve({{at - w, 0}, {at, k}, {at + w, 0}}, at - w, at + w),
-          0.5 * rising(k, w) + through * behind, -std::expm1(-k * w)};
-}
-
-std::vector<Medium> stiff_suite() {
-  std::vector<Medium> media;
-  for (const double k : {1.0, 30.0, 1e3, 1e4, 1e5, 1e6})
-    for (const Medium& m : {ramp(k), falling_ramp(k), constant_medium(k), step_medium(k), peak(k, 0.05), peak(k, 1e-4)}) {
-      media.push_back(m);
-      media.back().name += fmt::format(", extinction {}", k);
-    }
-  return media;
-}
-
-/// The ray through the middle of a 4^3 mesh along x, from kFrom to kTo.
-Scene one_ray(TransferFunction tf) {
-  Scene scene;
-  scene.settings.mode = Mode::dvr;
-  scene.settings.width = scene.settings.height = 1;
-  scene.view.orthographic = true;
-  scene.view.eye = {-2, 0.4, 0.45};
-  scene.view.at = {0, 0.4, 0.45};
-  scene.view.up = {0, 0, 1};
-  scene.view.height = 1e-3;
-  scene.region = {Vec3d(kFrom, 0, 0), Vec3d(kTo, 1, 1)};
-  scene.transfer_function = std::move(tf);
-  return scene;
-}
-
-AmrHierarchy column(const Function& f) { return MeshBuilder(Vec3i(4)).root(f).hierarchy(); }
-AmrHierarchy column() {
-  return column([](const Vec3d& p) { return p.x; });
-}
-
-double off(const ReferencePicture& drawn, const Medium& m) {
-  const double* pixel = drawn.picture.pixel(0, 0);
-  return std::max(std::abs(pixel[0] - m.color), std::abs(pixel[3] - m.opacity));
-}
-
 TEST(StiffReference, IsWithinItsToleranceOfClosedForms) {
   const AmrHierarchy h = column();
   for (const FilterDefinition& d : {FilterDefinition{Filter::linear_lod}, {Filter::linear_page, 4}, {Filter::basis}}) {
     const HierarchyReference reference(h, 0, d);
-    for (const Medium& m : stiff_suite()) {
+    for (const Medium& m : stiff_media()) {
       const ReferencePicture drawn = reference.draw(one_ray(m.tf));
       ASSERT_TRUE(drawn.error);
       EXPECT_LE(off(drawn, m), *drawn.error + 4e-15) << m.name << ", " << filter_name(d.filter);
@@ -224,7 +125,7 @@ TEST(StiffReference, KeepsTighterAndLooserTolerances) {
   const AmrHierarchy h = column();
   const HierarchyReference reference(h, 0, {Filter::linear_lod});
   for (const double tolerance : {1e-2, 1e-5, 1e-10})
-    for (const Medium& m : stiff_suite()) {
+    for (const Medium& m : stiff_media()) {
       const ReferencePicture drawn = reference.draw(one_ray(m.tf), ReferenceTolerance{tolerance});
       EXPECT_LE(off(drawn, m), *drawn.error + 4e-15) << m.name << ", " << tolerance;
       EXPECT_LE(*drawn.error, tolerance + 2e-8) << m.name << ", " << tolerance << ": places are rounded, too";
@@ -235,31 +136,20 @@ TEST(StiffReference, FixedStepsAreOffThere) {
   const AmrHierarchy h = column();
   const HierarchyReference reference(h, 0, {Filter::linear_lod});
   double worst = 0;
-  for (const Medium& m : stiff_suite()) worst = std::max(worst, off(reference.draw(one_ray(m.tf), 1.0 / 16), m));
+  for (const Medium& m : stiff_media()) worst = std::max(worst, off(reference.draw(one_ray(m.tf), 1.0 / 16), m));
   EXPECT_GT(worst, 1e-3);
   EXPECT_FALSE(reference.draw(one_ray(ramp(1).tf), 1.0 / 16).error) << "it does not know its error";
-}
-
-/// Over the whole suite: the worst error and all evaluations.
-std::pair<double, std::int64_t> over_suite(const HierarchyReference& reference, const ReferenceRule& rule) {
-  std::pair<double, std::int64_t> all{0, 0};
-  for (const Medium& m : stiff_suite()) {
-    const ReferencePicture drawn = reference.draw(one_ray(m.tf), rule);
-    all.first = std::max(all.first, off(drawn, m));
-    all.second += drawn.evaluations;
-  }
-  return all;
 }
 
 TEST(StiffReference, TakesFewerEvaluationsThanTheFixedStepThatIsAsGood) {
   const AmrHierarchy h = column();
   const HierarchyReference reference(h, 0, {Filter::linear_lod});
-  const auto [worst, taken] = over_suite(reference, {});
+  const auto [worst, taken] = over_stiff_media(reference, {});
   EXPECT_LE(worst, kAsked);
-  EXPECT_LE(taken, 8 * over_suite(reference, 1.0 / 16).second);
+  EXPECT_LE(taken, 8 * over_stiff_media(reference, 1.0 / 16).second);
   double step = 1;
-  while (over_suite(reference, step).first > kAsked && step > 1e-5) step /= 2;
-  EXPECT_LE(taken, over_suite(reference, step).second) << "the step " << step;
+  while (over_stiff_media(reference, step).first > kAsked && step > 1e-5) step /= 2;
+  EXPECT_LE(taken, over_stiff_media(reference, step).second) << "the step " << step;
 }
 
 TEST(StiffReference, SixtyDecadesOnALogarithmicAxis) {
