@@ -1,6 +1,5 @@
 // The double reference itself, which no other suite can judge: stiff media in closed form, and what it says of its own error.
-
-#include <vector>
+#include <array>
 
 #include "bench/verify/stiff_media.hpp"
 #include "bench/verify/verify.hpp"
@@ -8,7 +7,7 @@
 namespace amrtex::verify {
 namespace {
 
-const std::vector<FilterDefinition> kLinear{{Filter::linear_lod}, {Filter::linear_page, 4}, {Filter::basis}};
+constexpr std::array<FilterDefinition, 3> kLinear{{{Filter::linear_lod}, {Filter::linear_page, 4}, {Filter::basis}}};
 
 void closed_forms(VerifyContext& v) {
   const AmrHierarchy h = column();
