@@ -9,7 +9,7 @@ git clone --quiet . "$folder/clone"
 cd "$folder/clone"
 unset AMRTEX_PRESET
 # the tests themselves run elsewhere; here one stands for all, after test.sh has counted them
-run_tests() { scripts/test.sh -- -R '^Encodings\.|^statistics' >"$folder/log" 2>&1 || { tail -n 40 "$folder/log" >&2; exit 1; }; }
+run_tests() { scripts/test.sh -- -R '^Statistics\.' >"$folder/log" 2>&1 || { tail -n 40 "$folder/log" >&2; exit 1; }; }
 run_demo() { scripts/demo.sh >"$folder/log" 2>&1 || { tail -n 40 "$folder/log" >&2; exit 1; }; }
 for command in run_demo run_tests run_tests run_demo run_demo run_tests; do
   $command

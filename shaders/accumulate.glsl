@@ -1,6 +1,9 @@
 // What a ray has gathered so far, and how one interval adds to it.
 DEFINE_INT(AMRTEX_MODE)        // one of the AMRTEX_MODE_... below
 DEFINE_INT(AMRTEX_INTEGRATOR)  // one of the AMRTEX_INTEGRATOR_... below
+DEFINE_INT(AMRTEX_OFFSET_PICTURE)  // 1 where a projection or mip is of values whose units have an offset, else 0
+
+UNIFORM(real, u_sum_unit)  // line integrals count in: a power of two, so that their sums are floats
 
 // the same numbers as enum class Mode (renderers/scene/scene.hpp)
 #define AMRTEX_MODE_DVR 0
@@ -37,6 +40,8 @@ STRUCT Accumulation {
   real sum;            // optical depth, or the line integral in units of ray length ...
   real lost;           // ... and what its float sum has lost so far (Kahan): long rays must not drift
   real maximum;
+  real passed;         // offset pictures: ray length of what has values ...
+  real passed_lost;    // ... and what its sum has lost
   int below;           // isovalues at or below the last sample; -1: it had no value, or there was none
   int beyond;          // the same of the sample that lies across a surface from it
   bool crossing;       // is there such a sample?
@@ -44,9 +49,12 @@ STRUCT Accumulation {
   ray_real after;      // ... the one across the surface (units of ray length)
   ray_real between;    // where the interval of the one ends and that of the other begins
   int end_state;       // pre-integrated: one of AMRTEX_END_..., and ...
-  real end_axis;       // ... the axis value there
-  int end_level;       // by tolerance: level of the region that it was taken in
-  real stride;         // by tolerance: length of the next interval to try
+  real end_axis;       // ... the axis value there; by tolerance the value itself
+  int end_level;       // by tolerance: level of the region that it was taken in, ...
+  real stride;         // ... length of the next interval to try, ...
+  real whole;          // ... of the ray, ...
+  real passed;         // ... of the part of it before this one, ...
+  real spent;          // ... and the bound of the error so far
   vec4r surface;       // depth: world distance to the first surface; normal: its normal, 1
   bool probing;        // a secondary ray that looks for surfaces and gathers nothing
   ivec3 counted;       // samples, regions, regions skipped
@@ -59,6 +67,8 @@ Accumulation empty_accumulation() {
   a.sum = real(0);
   a.lost = real(0);
   a.maximum = as_real(0xff800000u);  // minus infinity: no value is smaller
+  a.passed = real(0);
+  a.passed_lost = real(0);
   a.below = -1;
   a.beyond = -1;
   a.crossing = false;
@@ -69,6 +79,9 @@ Accumulation empty_accumulation() {
   a.end_axis = real(0);
   a.end_level = -1;
   a.stride = real(1e30);
+  a.whole = real(1);
+  a.passed = real(0);
+  a.spent = real(0);
   a.surface = vec4r(0);
   a.probing = false;
   a.counted = ivec3(0);
@@ -81,6 +94,15 @@ void add_compensated(INOUT(Accumulation) a, IN(real) amount) {
   PRECISE real lost = (t - a.sum) - y;
   a.lost = lost;
   a.sum = t;
+}
+
+// The same of the length of what has values.
+void add_passed(INOUT(Accumulation) a, IN(real) length) {
+  PRECISE real y = length - a.passed_lost;
+  PRECISE real t = a.passed + y;
+  PRECISE real lost = (t - a.passed) - y;
+  a.passed_lost = lost;
+  a.passed = t;
 }
 
 // The control: dC = T k c ds and dT = -T k ds in one explicit step each. T becomes negative or grows without bound where
@@ -145,8 +167,9 @@ void accumulate(INOUT(Accumulation) a, IN(real) value, IN(real) length) {
     vec4r light = interval_light(value, length);
     if (light.w > real(0)) add_light(a, light);
   } else if (AMRTEX_MODE == AMRTEX_MODE_PROJECTION) {
-    PRECISE real part = value * length;
+    PRECISE real part = value * u_sum_unit * length;
     add_compensated(a, part);
+    if (AMRTEX_OFFSET_PICTURE != 0) add_passed(a, length);
   } else if (AMRTEX_MODE == AMRTEX_MODE_MIP) {
     a.maximum = max(a.maximum, value);
   }

@@ -60,8 +60,9 @@ real basis_between(IN(BasisPiece) p, IN(int) field, IN(ivec3) i, IN(ivec3) j, IN
 // Trilinear between the centres of a piece's cells, constant beyond the outer ones; x in cell widths from its corner.
 real basis_clamped_value(IN(BasisPiece) p, IN(int) field, IN(vec3r) x) {
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
-  // Past the centre the texture unit would read of another piece's texel: the rounding of its coordinate is kept off.
-  vec3r off = min(vec3r(p.cells - ivec3(1)), vec3r(1)) * (1.1920929e-7 * basis_widest_texture(p));
+  // Past the centre the texture unit would read of another piece's texel: the rounding of its coordinate is kept off. That is four times 2^-24 of
+  // the extent: of the sum here, the inverse extent, their product, and the texture unit's way back to texels.
+  vec3r off = min(vec3r(p.cells - ivec3(1)), vec3r(1)) * (2.3841858e-7 * basis_widest_texture(p));
   vec3r inside = clamp(x, vec3r(0.5) + off, vec3r(p.cells) - vec3r(0.5) - off);
   return decode_value(basis_filtered(p, field, vec3r(p.texel) + inside), field);
 #else

@@ -71,6 +71,7 @@ void march_adaptive_box(IN(Ray) ray, IN(Region) r, INOUT(Accumulation) a) {
   if (!region_interval(ray, r, ray_real(0), enter, leave)) return;
   vec3r f = vec3r(ray.entry + ray.direction * enter - ray_vec3(r.lower));
   f = clamp(f, vec3r(0), vec3r(r.upper - r.lower));
+  if (AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE) open_account(a, real(ray.length), real(enter), real(leave - enter));
   march_adaptive_region(a, r, f, vec3r(ray.direction), real(leave - enter), enter, real(0.5), ray.phase);
 }
 

@@ -1,6 +1,7 @@
 // The sampler contract: what an encoding provides and what is built on it, once.
 // Prose: README.md. Spaces: integer cells of the finest level ("finest"), and cell
 // widths of a region from its lower corner ("region", the q below).
+// A value is a number in the units of its field (structures/mesh/value_units.hpp); the host puts pictures into field units.
 DEFINE_INT(AMRTEX_FILTER)              // one of the AMRTEX_FILTER_... below
 DEFINE_INT(AMRTEX_HARDWARE_FILTERING)  // 1 where the texture unit interpolates, else 0
 DEFINE_INT(AMRTEX_POWER_OF_TWO)        // 1 where all refinement ratios are powers of two, else 0
@@ -10,7 +11,7 @@ DEFINE_INT(AMRTEX_FIELDS)              // how many fields of the mesh the struct
 DEFINE_INT(AMRTEX_VALIDITY)            // 1 where cells may have no value in some field, else 0
 DEFINE_INT(AMRTEX_VALUE_RANGES)        // 1 where regions know their value range, else 0
 DEFINE_INT(AMRTEX_FIELD_RANGES)        // 1 where fields beside the first have value ranges as well, else 0
-DEFINE_INT(AMRTEX_SCALED_STORAGE)      // 1 where texels hold (value - a) / b, else 0
+DEFINE_INT(AMRTEX_SCALED_STORAGE)      // 1 where texels hold (value - a) / b of a value, else 0
 DEFINE_INT(AMRTEX_LEVEL_OF_DETAIL)     // 1 where refined cells may be drawn in place of what lies below, else 0
 
 // the same numbers as enum class Filter (structures/mesh/filter.hpp; tests/filter_test.cpp compares)
@@ -169,6 +170,11 @@ void fetch_stencil(IN(Region) r, IN(ivec3) octant, OUT(Stencil) s) {
   s.upper = vec4r(0);
   s.leaves = 0u;
 }
+#endif
+
+// Optional: may hats of finer cells than the region's reach into it?
+#ifndef AMRTEX_FINER_HATS
+#define AMRTEX_FINER_HATS false
 #endif
 
 // Optional: level of the leaf cell that holds a position of the region, where that is not the region's own.

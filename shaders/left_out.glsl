@@ -24,6 +24,8 @@ void take_point(INOUT(Accumulation) a, IN(bool) missing, IN(real) value, IN(real
 #endif
 
 #if AMRTEX_INTEGRATOR != AMRTEX_INTEGRATOR_TOLERANCE
-void march_tolerance_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(vec3r) dq, IN(real) length, IN(real) least) {}
+void open_account(INOUT(Accumulation) a, IN(real) whole, IN(real) begin, IN(real) part) {}
+void march_tolerance_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(vec3r) dq, IN(real) length, IN(real) begin,
+                            IN(real) least) {}
 #endif
 #endif

@@ -10,7 +10,7 @@ UNIFORM(ray_vec3, u_cells_per_unit)  // finest cells a unit; (1, 1, 1) for cubic
 UNIFORM(ray_vec3, u_draw_lower)      // finest: the domain, or the sub-box to draw
 UNIFORM(ray_vec3, u_draw_upper)      // finest
 UNIFORM(vec2r, u_picture_size)       // pixels
-UNIFORM(real, u_length_unit)         // world length of one unit of ray length
+UNIFORM(real, u_length_unit)         // world length of one unit of ray length; the host may take a power of two out of it
 
 DEFINE_INT(AMRTEX_CLIP_PLANES)  // how many planes cut what is drawn; 0 leaves them out
 DEFINE_INT(AMRTEX_RAY_OFFSET)   // 1 where the intervals of each ray are moved by a number of its own, else 0

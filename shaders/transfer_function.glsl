@@ -10,10 +10,11 @@ DEFINE_INT(AMRTEX_COLOR_POINTS)       // how many points colour has; 0 for the t
 UNIFORM_ARRAY(real, u_invisible_ranges, 2 * AMRTEX_INVISIBLE_RANGES, 16)  // first and last value of each
 #endif
 
-// The value, or its log10: where the points stand.
+// The value, or its log10: where the points stand. What is not above 0 lies before all points.
 real curve_axis(IN(real) value, IN(bool) logarithmic) {
   if (!logarithmic) return value;
-  return log2(max(value, real(1e-37))) * real(0.30102999566398119521);
+  if (!(value > real(0))) return real(-1e30);
+  return log2(max(value, real(1.17549435e-38))) * real(0.30102999566398119521);
 }
 real transfer_axis(IN(real) value) { return curve_axis(value, AMRTEX_LOGARITHMIC != 0); }
 

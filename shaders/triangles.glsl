@@ -17,28 +17,6 @@ ray_real triangle_place(IN(Ray) ray, IN(vec4r) first) {
   return place;
 }
 
-#if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
-// A surface between the last sample and the triangle: found by a sample of no length at the ray's end.
-void draw_last_surfaces(IN(Ray) ray, INOUT(Accumulation) a) {
-  Ray last = ray;
-#if AMRTEX_CPP || AMRTEX_MIRROR
-  if (AMRTEX_MIRROR != 0) {
-    bool goes_on = false;
-    bool drawn = mirrored_part(ray, 0, last, goes_on);
-    if (goes_on) drawn = mirrored_part(ray, 1, last, goes_on);
-    if (!drawn) return;
-  }
-#endif
-  bool more = !picture_ended(a);
-  while (more) {
-    note_end(last, a);
-    more = a.crossing;
-    if (a.crossing) draw_surface(last, a);
-    more = more && !picture_ended(a);
-  }
-}
-#endif
-
 // The triangle behind what a ray gathered; it has no place in pictures of one channel.
 vec4r over_triangle(IN(vec4r) color, IN(vec4r) first) {
   if (first.w < real(0) || AMRTEX_MODE == AMRTEX_MODE_PROJECTION || AMRTEX_MODE == AMRTEX_MODE_MIP) return color;
@@ -52,20 +30,12 @@ vec4r march_to_triangle(IN(vec2r) pixel, INOUT(Accumulation) a, OUT(bool) met) {
   Ray ray;
   vec4r first = first_triangle(pixel);
   vec4r color = missed_picture();
-  bool ends = false;
   met = camera_ray(pixel, ray);
   if (met && first.w >= real(0)) {
     ray_real place = triangle_place(ray, first);
-    ends = place < ray.length;
     ray.length = min(ray.length, place);
     met = ray.length > ray.first;
   }
   if (met) color = march_ray(ray, a);
-#if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
-  if (AMRTEX_ISOVALUES != 0 && met && ends) {
-    draw_last_surfaces(ray, a);
-    color = surface_picture(a);
-  }
-#endif
   return over_triangle(color, first);
 }

@@ -201,7 +201,7 @@ TEST(Advice, IsGoodOnASmallMeshThatIsReallyMeasured) {
   request.reference = Filter::linear_lod;
   RunOptions options;
   options.folder = name;
-  const Effort full{96, 96, 1, 0, 0.25};
+  const Effort full{96, 96, 1, 0};
   const Advice advice = advise(request, full, measure_by_running(scene, request, options));
   expect_best_of_measured(advice, request);
   EXPECT_EQ(load_records(name).front().at("experiment"), "advise");

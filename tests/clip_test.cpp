@@ -62,14 +62,6 @@ Picture draw_boxes(const AmrHierarchy& h, const EncodingCase& c, const Scene& sc
   return consumer.read();
 }
 
-bool gives_boxes(const AmrHierarchy& h, const EncodingCase& c) {
-  try {
-    return !build(h, c, {.draw_boxes = true}).draw_tree.empty();
-  } catch (const UnsupportedError&) {
-    return false;
-  }
-}
-
 // ---- closed forms ----
 
 TEST(Clip, OfAConstantMediumInHalfHalvesItsWay) {
@@ -142,7 +134,7 @@ TEST(Clip, CutsInEveryIntegrator) {
     const EncodedField field = build(h, c);
     for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive})
       for (const Integrator integrator : {Integrator::left, Integrator::preintegrated, Integrator::tolerance}) {
-        if (integrator == Integrator::tolerance && (sampling == Sampling::lattice || c.filter == Filter::nearest)) continue;
+        if (integrator == Integrator::tolerance && (sampling == Sampling::lattice || !interpolating(c))) continue;
         SCOPED_TRACE(integrator_name(integrator));
         Scene scene = clip_scene(Mode::dvr, sampling, {kOblique});
         scene.transfer_function = constant_light(k);
@@ -268,7 +260,7 @@ TEST(Clip, ConvergesToTheReferenceInEveryModeAndFilter) {
         scene.settings.step = 0.05;
         const Picture cut = render_on_cpu(h, field, scene, true);
         // a ray that grazes a surface meets it or does not; in mip of nearest, a cell that it crosses within one step
-        const bool may_miss = mode == Mode::mip && c.filter == Filter::nearest;
+        const bool may_miss = mode == Mode::mip && !interpolating(c);
         EXPECT_LE(rms_difference(cut, reference), scene.settings.draws_surfaces() ? 4e-2 : may_miss ? 2e-2 : 5e-3);
         scene.settings.clip_planes.pop_back();
         EXPECT_GT(difference(render_on_cpu(h, field, scene, true), reference), 2e-2) << "control: one plane less";
@@ -286,8 +278,7 @@ TEST(Clip, TakesTheShadowsOfWhatItCutsAway) {
     scene.settings.step = 0.1;
     scene.settings.point_light = PointLight{{-0.5, 0.6, 0.4}, 0.1, 0.2};
     const Picture cut = render_on_cpu(h, field, scene, true);
-    EXPECT_LE(difference(cut, HierarchyReference(h, 0, field.definition).render(scene, 0.25)),
-              c.filter == Filter::nearest ? 6e-2 : 3e-2);
+    EXPECT_LE(difference(cut, HierarchyReference(h, 0, field.definition).render(scene, 0.25)), interpolating(c) ? 3e-2 : 6e-2);
     scene.settings.clip_planes.clear();
     scene.region = {{Vec3d(0.5, 0, 0), Vec3d(1)}};
     EXPECT_LE(difference(cut, render_on_cpu(h, field, scene, true)), 1e-2);

@@ -409,6 +409,44 @@ TEST_F(CommandLine, SampleOutsideIsNull) {
   }
 }
 
+/// Two cells of values 0 and 1 along x, their centres at 1/2 and 3/2.
+const std::string kTwoCells =
+    R"({"field": {"type": "step"}, "levels": 1, "root": [2, 1, 1], "domain": {"lower": [0, 0, 0], "upper": [2, 1, 1]}})";
+
+TEST_F(CommandLine, SamplesInDoubleAreTakenAtThePointItself) {
+  // between the centres f = x - 1/2, so 0.9 gives 0.4; the point as a context is given it is half a unit of float's last digit off
+  ASSERT_EQ(amrtex({"generate", kTwoCells, "-o", at("mesh")}).exit_code, 0);
+  write_text(at("p"), "0.9 0.5 0.5\n1e300 0 0\n");
+  for (const char* encoding : {"uniform", "page_table"}) {
+    const Json samples =
+        json_of({"sample", at("mesh"), "--encoding", encoding, "--filter", "linear_page", "--points", at("p"), "--json"});
+    EXPECT_NEAR(samples[0].at("reference"), 0.4, 1e-15) << encoding;
+    EXPECT_NEAR(samples[0].at("encoding_double"), 0.4, 1e-15) << encoding;
+    const double p_gl = samples[0].at("p_gl")[0];
+    EXPECT_EQ(p_gl, static_cast<double>(0.9F)) << "the fraction of the first cell as float";
+    EXPECT_NEAR(samples[0].at("encoding_gl"), p_gl - 0.5, 0x1p-23) << encoding;
+    EXPECT_TRUE(samples[1].at("p_gl").is_null());
+  }
+  const Result r = amrtex({"sample", at("mesh"), "--encoding", "uniform", "--filter", "linear_page", "--points", at("p")});
+  EXPECT_THAT(r.out, AllOf(HasSubstr("GL point off"), HasSubstr("2.4e-08")));
+}
+
+TEST_F(CommandLine, SamplesOneUnitOffAFace) {
+  // the face at 1 belongs to the upper cell; one unit of the last digit below it is still the lower one
+  ASSERT_EQ(amrtex({"generate", kTwoCells, "-o", at("mesh")}).exit_code, 0);
+  write_text(at("p"), fmt::format("{} 0.5 0.5\n1 0.5 0.5\n{} 0.5 0.5\n", std::nextafter(1.0, 0.0), std::nextafter(1.0, 2.0)));
+  for (const char* encoding : {"uniform", "page_table", "octree", "kd_tree"}) {
+    const Json samples =
+        json_of({"sample", at("mesh"), "--encoding", encoding, "--filter", "nearest", "--points", at("p"), "--json"});
+    for (const char* column : {"reference", "encoding_double", "encoding_gl"}) {
+      EXPECT_EQ(samples[0].at(column), 0) << encoding << ", " << column;
+      EXPECT_EQ(samples[1].at(column), 1) << encoding << ", " << column;
+      EXPECT_EQ(samples[2].at(column), 1) << encoding << ", " << column;
+    }
+    EXPECT_LT(samples[0].at("p_gl")[0].get<double>(), 1) << "in its cell";
+  }
+}
+
 TEST_F(CommandLine, SampleToRead) {
   write_text(at("p"), "0.51 0.52 0.53\n1.5 0 0\n");
   const Result r = amrtex({"sample", kData, "--encoding", "uniform", "--filter", "nearest", "--points", at("p")});

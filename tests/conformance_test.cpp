@@ -7,7 +7,7 @@
 
 #include "renderers/bindings/scene_bindings.hpp"
 #include "renderers/consumers/raycaster.hpp"
-#include "shaders/shader_library.hpp"
+#include "tests/gl_probe.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {
@@ -267,7 +267,7 @@ layout(local_size_x = 64) in;
 struct Probe { vec4 value; ivec4 lower; ivec4 upper; };
 layout(std430) readonly buffer cells_block { ivec4 cells[]; };
 layout(std430) readonly buffer fractions_block { vec4 fractions[]; };
-layout(std430) writeonly buffer probes_block { Probe probes[]; };
+layout(std430) writeonly buffer results_block { Probe probes[]; };
 uniform int u_count;
 void main() {
   int i = int(gl_GlobalInvocationID.x);
@@ -285,45 +285,16 @@ void main() {
 }
 )";
 
-template <class T>
-GlBuffer upload(Context& gl, const std::vector<T>& data) {
-  GlBuffer buffer = make_buffer(gl);
-  gl.gl().NamedBufferStorage(buffer.id(), static_cast<GLsizeiptr>(data.size() * sizeof(T)), data.data(), 0);
-  return buffer;
-}
-
 std::vector<RegionProbe> probe_regions(Context& gl, const AmrHierarchy& h, const EncodedField& field,
                                        std::span<const FinestPosition> positions) {
-  ShaderFiles files{{"region_probe.comp", kRegionProbe}};
-  for (const ShaderFile& f : shader_files()) files.emplace(f.path, f.text);
-  ShaderKey key;
-  key.entry = "region_probe.comp";
-  key.use(field.shader).define("AMRTEX_RAY_DOUBLE", 0);
-  Program program(gl, assemble_shader(key, files));
   std::vector<glm::ivec4> cells;
   std::vector<glm::vec4> fractions;
   for (const FinestPosition& p : positions) {
     cells.emplace_back(p.cell, 0);
     fractions.emplace_back(Vec3f(p.fraction), 0);
   }
-  std::vector<RegionProbe> probes(positions.size());
-  const GlBuffer cell_buffer = upload(gl, cells);
-  const GlBuffer fraction_buffer = upload(gl, fractions);
-  const GlBuffer probe_buffer = upload(gl, probes);
-  const GpuField gpu(field, gl);
-  program.use();
-  for (const UniformValue& u : field_uniforms(h, field)) program.set_optional(u);
-  program.set("u_count", static_cast<int>(positions.size()));
-  program.bind_buffer("cells_block", cell_buffer.id());
-  program.bind_buffer("fractions_block", fraction_buffer.id());
-  program.bind_buffer("probes_block", probe_buffer.id());
-  gpu.bind(program);
-  gl.gl().DispatchCompute(static_cast<GLuint>((positions.size() + 63) / 64), 1, 1);
-  gl.gl().MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  gl.gl().GetNamedBufferSubData(probe_buffer.id(), 0, static_cast<GLsizeiptr>(probes.size() * sizeof(RegionProbe)),
-                                probes.data());
-  gl.check("probing regions");
-  return probes;
+  return run_probe<RegionProbe>(gl, field, field_uniforms(h, field), kRegionProbe, positions.size(),
+                                {{"cells_block", cells}, {"fractions_block", fractions}});
 }
 
 TEST(Conformance, RegionsHoldTheirPositionsAndTheirValues) {

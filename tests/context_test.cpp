@@ -134,6 +134,7 @@ TEST_P(ContextTest, IsCore45AndKnowsItsLimits) {
   EXPECT_GE(info.version.substr(0, 3), "4.5");
   EXPECT_FALSE(info.renderer.empty());
   EXPECT_GE(info.max_3d_texture_size, 2048);
+  EXPECT_GE(info.max_texture_bytes, 1 << 28);
   EXPECT_GE(info.max_buffer_bytes, 1 << 24);
   EXPECT_GE(info.max_texture_units, 16);
   EXPECT_GE(info.max_viewport_width, 4096);

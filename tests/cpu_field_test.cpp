@@ -65,7 +65,7 @@ void for_each_field(const AmrHierarchy& h, const Scene& scene, F&& f) {
   for_each_encoding([&](const EncodingCase& c) {
     BuildRequest request = build_request(c, {});
     request.needs = scene_needs(scene, c.filter, Filtering::manual);
-    if (scene.settings.integrator == Integrator::tolerance && c.filter == Filter::nearest) return;
+    if (scene.settings.integrator == Integrator::tolerance && !interpolating(c)) return;
     const EncodedField field = c.encoding->build(h, request);
     f(field, Given(field, bind_scene(h, field, scene)));
   });

@@ -174,6 +174,23 @@ TEST(Layout, NamesThePartThatALimitRefuses) {
   request.context.max_buffer_bytes = 40;
   request.context.max_3d_texture_size = 3;
   EXPECT_THAT(refusal<UnsupportedError>(limits), AllOf(HasSubstr("values: 2 x 3 x 4 texels"), HasSubstr("at most 3")));
+  request.context.max_3d_texture_size = 4;
+  request.context.max_texture_bytes = 96;
+  EXPECT_NO_THROW(limits());
+  request.context.max_texture_bytes = 95;
+  EXPECT_THAT(refusal<UnsupportedError>(limits),
+              AllOf(HasSubstr("values: 2 x 3 x 4 texels (96 bytes)"), HasSubstr("and 95 bytes")));
+}
+
+TEST(Layout, CountsPartsThatNoNumberHolds) {
+  // (2^31)^3 texels: 2^93; the largest number stands for it, and no sum wraps round
+  const Part part = texture_part("all", "all", TexelFormat::rg32ui, Vec3i(std::numeric_limits<int>::max()));
+  EXPECT_EQ(part.bytes(), std::numeric_limits<std::int64_t>::max());
+  const Declared encoding;
+  const BuildRequest request;
+  Layout layout = small_layout(encoding, request);
+  layout.add(part);
+  EXPECT_EQ(layout.bytes(), std::numeric_limits<std::int64_t>::max());
 }
 
 TEST(Layout, NamesTheLargestPartWhereTheBudgetIsPassed) {

@@ -495,6 +495,8 @@ TEST(ExperimentErrors, NameKeyAndWhatIsAccepted) {
       {"seed", "[1, 2]", "seed:", "an integer"},
       {"reference", "3", "reference:", "an object"},
       {"reference", R"({"step": 0})", "reference.step:", "above 0"},
+      {"reference", R"({"tolerance": 0})", "reference.tolerance:", "1e-13"},
+      {"reference", R"({"tolerance": 1e-9, "step": 0.5})", "reference.step:", "stands in place of 'tolerance'; accepted: one of both"},
       {"reference", R"({"filter": "cubic"})", "reference.filter:", "own, nearest"},
       {"reference", R"({"filters": "own"})", "reference.filters:", "did you mean 'filter'?"},
       {"reference", R"({"own": false, "filter": "own"})", "reference.own:", "there is no reference"},

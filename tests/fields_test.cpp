@@ -265,7 +265,7 @@ TEST(Fields, AreTheSameOnGl) {
     scene.settings.skip = true;
     const EncodedField field = build_for(h, c, scene);
     EXPECT_LE(rms_difference(draw(context(ContextKind::egl), h, field, scene), render_on_cpu(h, field, scene, true)),
-              c.filter == Filter::nearest ? 2e-2 : 1e-4);
+              interpolating(c) ? 1e-4 : 2e-2);
   });
 }
 

@@ -132,6 +132,111 @@ TEST(Hit, IsNotWhereNoIsovalueIsReached) {
 
 // ---- what a surface adds ----
 
+// ---- ends of rays, and borders of the mesh ----
+
+double along_y(const Vec3d& p) { return p.y; }
+
+/// The mesh between two planes across x is missing.
+constexpr double kGapBegin = 0.375, kGapEnd = 0.625;
+
+/// Cells of 1/8: both halves, of patches or with cells without value between them.
+AmrHierarchy with_gap(bool hole) {
+  if (hole)
+    return MeshBuilder(Vec3i(8)).patch(0, {{0, 0, 0}, {3, 8, 8}}, along_y).patch(0, {{5, 0, 0}, {8, 8, 8}}, along_y).hierarchy();
+  return MeshBuilder(Vec3i(8)).root([](const Vec3d& p) { return p.x > kGapBegin && p.x < kGapEnd ? kNan : p.y; }).hierarchy();
+}
+
+/// Where the ray meets y = 1/2, if that is in the unit cube; nullopt within `margin` of a face of it or of the gap.
+std::optional<double> exact_depth(const WorldRay& ray, bool gap, double margin) {
+  const double t = (0.5 - ray.origin.y) / ray.direction.y;
+  const Vec3d p = ray.origin + t * ray.direction;
+  bool inside = p.x > 0 && p.x < 1 && p.z > 0 && p.z < 1;
+  std::vector<double> faces{p.x, 1 - p.x, p.z, 1 - p.z};
+  if (gap) {
+    inside = inside && (p.x < kGapBegin || p.x > kGapEnd);
+    faces.insert(faces.end(), {p.x - kGapBegin, p.x - kGapEnd});
+  }
+  for (const double face : faces)
+    if (std::abs(face) < margin) return std::nullopt;
+  return inside ? t : 0;
+}
+
+void expect_exact_depths(const Picture& depths, const Scene& scene, bool gap, double tolerance) {
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x)
+      if (const auto exact = exact_depth(ray_of(scene, x, y), gap, 1e-3)) {
+        ASSERT_NEAR(*depths.pixel(x, y), *exact, tolerance) << x << " " << y;
+      }
+}
+
+// f = y, and rays rise slowly: some meet y = 1/2 within a hundredth of a cell of where they enter or leave the mesh, and each has
+// a hit there, however long its intervals are.
+const View kRising = orthographic(Vec3d(0.5), {1, 0.3, 0.2}, 0.6);
+
+TEST(Hit, NextToAnEndOfTheRayIsFound) {
+  const AmrHierarchy h = MeshBuilder(Vec3i(4)).root(along_y).hierarchy();
+  for_each_accepted([&](const EncodingCase& c) {
+    if (!holds_linear(c.filter)) return;
+    const EncodedField doubles = in_double(h, c);
+    for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive})
+      for (const double step : {0.5, 2.0}) {
+        Scene scene = iso_scene(kRising, {0.5}, Output::depth, sampling);
+        scene.settings.step = step;
+        expect_exact_depths(render_on_cpu(h, doubles, scene, true), scene, false, 1e-12);
+      }
+  });
+}
+
+TEST(Hit, NextToAGapIsFound) {
+  for (const bool hole : {true, false}) {
+    const AmrHierarchy h = with_gap(hole);
+    for_each_accepted([&](const EncodingCase& c) {
+      if (!holds_linear(c.filter)) return;
+      const EncodedField doubles = in_double(h, c);
+      for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive}) {
+        const Scene scene = iso_scene(kRising, {0.5}, Output::depth, sampling);
+        expect_exact_depths(render_on_cpu(h, doubles, scene, true), scene, true, 1e-9);
+      }
+    });
+  }
+}
+
+TEST(Hit, NextToAnEndOrAGapIsFoundOnGl) {
+  const AmrHierarchy h = with_gap(true);
+  for_each_encoding([&](const EncodingCase& c) {
+    if (!holds_linear(c.filter)) return;
+    const EncodedField field = build(h, c);
+    for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive}) {
+      const Scene scene = iso_scene(kRising, {0.5}, Output::depth, sampling);
+      expect_exact_depths(draw(context(ContextKind::egl), h, field, scene), scene, true, 1e-4);
+    }
+  });
+}
+
+/// Pixels with a hit in one picture alone.
+int lone_hits(const Picture& a, const Picture& b) {
+  int n = 0;
+  for (std::size_t i = 0; i < a.values.size(); ++i) n += (a.values[i] > 0) != (b.values[i] > 0) ? 1 : 0;
+  return n;
+}
+
+TEST(Hit, IsWhereTheReferenceHasOneWhateverTheRegionThatARayEnters) {
+  // f rises along every axis, and so does each ray: a surface is met once
+  const auto rising = [](const Vec3d& p) { return p.y + 0.1 * p.x + 0.2 * p.z; };
+  for (const MeshBuilder& mesh : {nested(rising), jump_of_two(rising), holes_and_missing(rising)}) {
+    const AmrHierarchy h = mesh.hierarchy();
+    for_each_accepted([&](const EncodingCase& c) {
+      if (!holds_linear(c.filter)) return;
+      const EncodedField doubles = in_double(h, c);
+      for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive}) {
+        const Scene scene = iso_scene(kRising, {0.55}, Output::depth, sampling);
+        const Picture reference = HierarchyReference(h, 0, doubles.definition).render(scene, 0.0625);
+        EXPECT_EQ(lone_hits(render_on_cpu(h, doubles, scene, true), reference), 0) << sampling_name(sampling);
+      }
+    });
+  }
+}
+
 TEST(Surfaces, OneBehindAnotherAddUpInOrder) {
   // a1 c1 + (1 - a1) a2 c2, whichever side the ray comes from; surfaces of one interval too
   const AmrHierarchy h = MeshBuilder(Vec3i(16)).root(along_x).hierarchy();
@@ -272,7 +377,7 @@ TEST(Surfaces, AreLitByStoredGradientsWhereThereAreAny) {
   int stored = 0;
   for (const EncodingCase& c : cases_of_bytes()) {
     SCOPED_TRACE(c.name());
-    if (c.filter == Filter::nearest) continue;
+    if (!interpolating(c)) continue;
     BuildRequest request;
     request.storage = Storage::r8;
     request.needs.filter = c.filter;

@@ -10,9 +10,8 @@
 #include "bench/records/record.hpp"
 #include "renderers/bindings/scene_bindings.hpp"
 #include "renderers/cpu/cpu_field.hpp"
-#include "renderers/gpu/program.hpp"
-#include "shaders/shader_library.hpp"
 #include "structures/generators/random_mesh.hpp"
+#include "tests/gl_probe.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {
@@ -267,7 +266,7 @@ constexpr const char* kRegionProbe = R"(#include "portable_glsl.h"
 #include "contract.glsl"
 layout(local_size_x = 64) in;
 layout(std430) readonly buffer cells_block { ivec4 cells[]; };
-layout(std430) writeonly buffer regions_block { ivec4 regions[]; };
+layout(std430) writeonly buffer results_block { ivec4 regions[]; };
 uniform int u_count;
 void main() {
   int i = int(gl_GlobalInvocationID.x);
@@ -288,29 +287,8 @@ struct FoundRegion {
 
 std::vector<FoundRegion> regions_of(const AmrHierarchy& h, const EncodedField& field, const Scene& scene,
                                     const std::vector<glm::ivec4>& cells) {
-  Context& gl = context(ContextKind::egl);
-  ShaderFiles files{{"region_probe.comp", kRegionProbe}};
-  for (const ShaderFile& f : shader_files()) files.emplace(f.path, f.text);
-  ShaderKey key;
-  key.entry = "region_probe.comp";
-  key.use(field.shader).define("AMRTEX_RAY_DOUBLE", 0);
-  Program program(gl, assemble_shader(key, files));
-  std::vector<FoundRegion> regions(cells.size());
-  const GlBuffer in = make_buffer(gl);
-  const GlBuffer out = make_buffer(gl);
-  gl.gl().NamedBufferStorage(in.id(), static_cast<GLsizeiptr>(cells.size() * sizeof(glm::ivec4)), cells.data(), 0);
-  gl.gl().NamedBufferStorage(out.id(), static_cast<GLsizeiptr>(regions.size() * sizeof(FoundRegion)), regions.data(), 0);
-  const GpuField gpu(field, gl);
-  program.use();
-  for (const UniformValue& u : bind_scene(h, field, scene).uniforms) program.set_optional(u);
-  program.set("u_count", static_cast<int>(cells.size()));
-  program.bind_buffer("cells_block", in.id());
-  program.bind_buffer("regions_block", out.id());
-  gpu.bind(program);
-  gl.gl().DispatchCompute(static_cast<GLuint>((cells.size() + 63) / 64), 1, 1);
-  gl.gl().MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  gl.gl().GetNamedBufferSubData(out.id(), 0, static_cast<GLsizeiptr>(regions.size() * sizeof(FoundRegion)), regions.data());
-  return regions;
+  return run_probe<FoundRegion>(context(ContextKind::egl), field, bind_scene(h, field, scene).uniforms, kRegionProbe,
+                                cells.size(), {{"cells_block", cells}});
 }
 
 TEST(LevelOfDetail, EveryCellLiesInOneDrawnRegion) {
@@ -362,13 +340,6 @@ TEST(LevelOfDetail, EveryCellLiesInOneDrawnRegion) {
 
 // ---- pictures
 
-/// Root mean square of the difference of two pictures.
-double rms(const Picture& a, const Picture& b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.values.size(); ++i) sum += std::pow(a.values[i] - b.values[i], 2);
-  return std::sqrt(sum / static_cast<double>(a.values.size()));
-}
-
 AmrHierarchy three_levels() {
   return MeshBuilder(Vec3i(12), {2, 2})
       .root(waves)
@@ -401,7 +372,7 @@ TEST(LevelOfDetail, ErrorFallsWithTheThresholdToNothing) {
     const Picture whole = render_on_cpu(h, field, scene_of(h, std::nullopt), false);
     double before = kInf;
     for (const double threshold : {1000.0, 4.0, 2.5, 0.1}) {
-      const double error = rms(render_on_cpu(h, field, scene_of(h, threshold), false), whole);
+      const double error = rms_difference(render_on_cpu(h, field, scene_of(h, threshold), false), whole);
       EXPECT_LE(error, before) << threshold;
       if (before == kInf) {
         EXPECT_GT(error, 1e-4);
@@ -422,8 +393,8 @@ TEST(LevelOfDetail, TheContextDrawsWhatTheTextComputesWithFewerSamples) {
     const Picture picture = draw(gl, h, field, pruned, &coarse);
     // rays are floats here and doubles there. A ray through opposite faces of a region has samples in faces of its cells, which
     // nearest takes on either side
-    const double bound = c.filter == Filter::nearest ? 3e-3 : 1e-4;
-    EXPECT_LT(rms(picture, render_on_cpu(h, field, pruned, false)), bound);
+    const double bound = interpolating(c) ? 1e-4 : 3e-3;
+    EXPECT_LT(rms_difference(picture, render_on_cpu(h, field, pruned, false)), bound);
     const Picture whole = draw(gl, h, field, scene_of(h, kNoThreshold), &fine);
     EXPECT_LT(coarse.samples, fine.samples);
     EXPECT_EQ(whole.values, draw(gl, h, build(h, c), scene_of(h, std::nullopt)).values) << "off and a threshold of nothing";

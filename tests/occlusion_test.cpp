@@ -57,7 +57,7 @@ TEST(Occlusion, BesideAWallIsTheClosedForm) {
   const AmrHierarchy h = MeshBuilder(Vec3i(32)).root(corner).hierarchy();
   const double radius = 0.3;
   for_each_filter([&](const EncodingCase& c) {
-    if (c.filter == Filter::nearest) return;  // its walls are faces of cells, up to half a cell away
+    if (!interpolating(c)) return;  // its walls are faces of cells, up to half a cell away
     const EncodedField field = build(h, c);
     const Scene scene = open_scene(orthographic({kWall + 0.2, 0.5, kFloor}, {-0.2, 0, -1}, 0.24), 0, radius);
     const auto check = [&](const Picture& picture) {
@@ -88,7 +88,7 @@ TEST(Occlusion, IsNoneWhereAPlaneCutsTheWallAway) {
 TEST(Occlusion, InsideOfASphereIsAllAndOutsideNone) {
   const AmrHierarchy h = MeshBuilder(Vec3i(32)).root([](const Vec3d& p) { return glm::length(p - Vec3d(0.5)); }).hierarchy();
   for_each_filter([&](const EncodingCase& c) {
-    if (c.filter == Filter::nearest) return;  // of which stairs are left
+    if (!interpolating(c)) return;  // of which stairs are left
     const EncodedField field = build(h, c);
     const auto mean_share = [&](const View& view, double radius) {
       const Picture picture = render_on_cpu(h, field, open_scene(view, 0.3, radius, 64), true);

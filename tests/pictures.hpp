@@ -94,6 +94,15 @@ class GlPairs {
   std::vector<EncodingCase> all_, pairs_;
 };
 
+/// Can a consumer draw the structure box by box?
+inline bool gives_boxes(const AmrHierarchy& h, const EncodingCase& c) {
+  try {
+    return !build(h, c, {.draw_boxes = true}).draw_tree.empty();
+  } catch (const UnsupportedError&) {
+    return false;
+  }
+}
+
 /// Does f take values between those of cells?
 inline bool interpolating(const EncodingCase& c) { return interpolates(c.filter); }
 

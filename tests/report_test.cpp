@@ -11,6 +11,7 @@
 #include "bench/records/record.hpp"
 #include "bench/report/paper_tables.hpp"
 #include "structures/mesh/error.hpp"
+#include "tests/table_files.hpp"
 
 namespace amrtex {
 namespace {
@@ -52,10 +53,7 @@ Json record(const std::string& encoding, double wall_ms) {
   for (const char* key : {"split", "reference_error", "limited_by_reference", "within_tolerance_seen"}) r["error"][key] = nullptr;
   r["error_common"] = error_json({.rmse = 1.25e-7, .max = 1, .psnr_db = 42.5, .mrse = 0}, "r");
   r["error_common"]["filter"] = "linear_vertex";
-  r["context"] = {{"renderer", "llvmpipe"}, {"gl_version", nullptr},  {"extensions_missing", nullptr}, {"cpu", nullptr},
-                  {"cores", nullptr},       {"environment", nullptr}, {"build_type", nullptr},         {"compiler", nullptr},
-                  {"commit", nullptr},      {"dirty", nullptr},       {"shader_hash", nullptr},        {"date", nullptr},
-                  {"device", nullptr},      {"shader_cache", nullptr}};
+  r["context"] = test::context_of("llvmpipe");
   validate_record(r);
   return r;
 }

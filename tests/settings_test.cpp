@@ -352,6 +352,7 @@ TEST(SetOption, ReplacesAndAddsValues) {
   EXPECT_EQ(with({"mode=mip"}).renders[0].settings.mode, Mode::mip) << "text needs no quotes";
   EXPECT_EQ(with({"seed=7", "seed=8"}).seed, 8u) << "the last one holds";
   EXPECT_EQ(with({"reference.step=0.5"}).reference->step, 0.5) << "an object that the file does not have";
+  EXPECT_EQ(with({"reference.tolerance=1e-9"}).reference->tolerance, 1e-9);
   EXPECT_FALSE(with({"reference=null"}).reference);
   EXPECT_EQ(with({"ambient_occlusion.radius=0.25", "mode=iso", "isovalues=[1]"})
                 .renders[0]

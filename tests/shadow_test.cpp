@@ -259,12 +259,6 @@ Scene hill_scene(Mode mode = Mode::dvr) {
   return scene;
 }
 
-double root_mean_square(const Picture& a, const Picture& b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.values.size(); ++i) sum += std::pow(a.values[i] - b.values[i], 2);
-  return std::sqrt(sum / static_cast<double>(a.values.size()));
-}
-
 /// Pixels of which a channel differs by more than `bound`.
 int pixels_off(const Picture& a, const Picture& b, double bound) {
   int count = 0;
@@ -293,17 +287,17 @@ TEST(Lamp, ConvergesToTheReferenceInEveryFilter) {
         if (!references.contains(key)) references.emplace(key, HierarchyReference(h, 0, field.definition).render(scene, 0.5));
         std::vector<double> errors;
         Picture drawn;
-        for (const double step : {1.0, c.filter == Filter::nearest ? 0.05 : 0.1}) {
+        for (const double step : {1.0, interpolating(c) ? 0.1 : 0.05}) {
           scene.settings.step = scene.settings.point_light->shadow_step = step;
           drawn = render_on_cpu(h, field, scene, true);
-          errors.push_back(root_mean_square(drawn, references.at(key)));
+          errors.push_back(rms_difference(drawn, references.at(key)));
         }
         const bool surfaces = mode == Mode::dvr_iso;
         EXPECT_LE(errors[1], surfaces ? 2e-2 : 3e-3);
         EXPECT_LE(pixels_off(drawn, references.at(key), 3e-2), surfaces ? 2 : 0);
         EXPECT_LT(errors[1], errors[0]);
         scene.settings.point_light->position = {0.8, 0.7, -0.4};
-        EXPECT_GT(root_mean_square(render_on_cpu(h, field, scene, true), references.at(key)), 4 * errors[1])
+        EXPECT_GT(rms_difference(render_on_cpu(h, field, scene, true), references.at(key)), 4 * errors[1])
             << "control: the lamp elsewhere";
       });
     }

@@ -11,6 +11,7 @@
 
 #include "bench/report/table.hpp"
 #include "structures/mesh/error.hpp"
+#include "structures/mesh/json.hpp"
 
 namespace amrtex::test {
 
@@ -33,6 +34,15 @@ class TablesFileTest : public testing::Test {
  private:
   std::filesystem::path folder_;
 };
+
+/// `context` of a record, of which the renderer alone is known.
+inline Json context_of(const std::string& renderer) {
+  Json context = {{"renderer", renderer}};
+  for (const char* key : {"gl_version", "extensions_missing", "cpu", "cores", "environment", "build_type", "compiler", "commit",
+                          "dirty", "shader_hash", "date", "device", "shader_cache"})
+    context[key] = nullptr;
+  return context;
+}
 
 /// A column as it is printed.
 inline std::vector<std::string> cells(const Table& table, const std::string& key) {

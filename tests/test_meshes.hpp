@@ -1,7 +1,10 @@
 // Meshes that tests alone need, beside those of bench/verify/meshes.hpp.
 #pragma once
 
+#include <sys/resource.h>
+
 #include <cmath>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -29,6 +32,39 @@ inline MeshBuilder fields_with_gaps() {
   MeshBuilder mesh({32, 8, 8}, {2});
   mesh.patch(0, {{0, 0, 0}, {30, 8, 8}}, f).patch(1, Box{{20, 2, 2}, {28, 6, 7}}.refined(2), f);
   return mesh.also("g", g);
+}
+
+/// 4^3 root cells; each further level refines the middle 2^3 of the 4^3 cells of the one before. Values at random.
+inline AmrHierarchy deep_corner(int levels) {
+  std::mt19937_64 random(static_cast<std::uint64_t>(levels));
+  std::uniform_real_distribution<double> unit(0, 1);
+  MeshBuilder mesh(Vec3i(4), std::vector<int>(static_cast<std::size_t>(levels - 1), 2));
+  for (int level = 0; level < levels; ++level) {
+    const Vec3i middle(1 << (level + 1));
+    std::vector<double> values(64);
+    for (double& v : values) v = unit(random);
+    mesh.patch(level, {middle - Vec3i(2), middle + Vec3i(2)}, std::move(values));
+  }
+  return mesh.hierarchy();
+}
+
+/// Two cells far apart in a domain of 2^29 x 2^20 x 2^29 cells, the second one refined.
+inline AmrHierarchy two_cells_far_apart() {
+  const Vec3i root(1 << 29, 1 << 20, 1 << 29);
+  const Vec3i first(5, 3, 7);
+  const Vec3i second = root - Vec3i(9, 1, 1);
+  return MeshBuilder(root, {2})
+      .patch(0, {first, first + Vec3i(1)}, constant(1))
+      .patch(0, {second, second + Vec3i(1)}, constant(kPoison))
+      .patch(1, {second * 2, second * 2 + Vec3i(2)}, std::vector<double>{3, 4, 5, 6, 7, 8, 9, 10})
+      .hierarchy();
+}
+
+/// Most memory that this process ever held.
+inline std::int64_t peak_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return std::int64_t{1024} * usage.ru_maxrss;
 }
 
 struct NamedMesh {

@@ -434,7 +434,7 @@ TEST(Triangles, EndRaysWhateverElseDrawsThem) {
         EXPECT_LE(off_beer_lambert(render_on_cpu(h, field, scene, true), scene, 1.5, at, normal, variant.lower, variant.upper),
                   variant.bound);
       }
-    if (c.filter == Filter::nearest) return;
+    if (!interpolating(c)) return;
     Scene scene = triangle_scene(Mode::dvr, Sampling::adaptive, {object(square(at, normal))}, oblique());
     scene.transfer_function = constant_light(1.5);
     scene.settings.integrator = Integrator::tolerance;
@@ -561,7 +561,7 @@ TEST(Triangles, AreTheSameOnGl) {
       if (!in_turn(mode == Mode::projection ? 0 : 1, pair, 2)) continue;
       const Scene scene = triangle_scene(mode, Sampling::adaptive, {object(tetrahedron())}, oblique());
       EXPECT_LE(rms_difference(draw(context(ContextKind::egl), h, field, scene), render_on_cpu(h, field, scene, true)),
-                c.filter == Filter::nearest || mode == Mode::dvr_iso ? 2e-2 : 1e-4);
+                !interpolating(c) || mode == Mode::dvr_iso ? 2e-2 : 1e-4);
     }
   });
 }

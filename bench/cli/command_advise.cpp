@@ -228,7 +228,7 @@ int run(const Arguments& a) {
   };
   const Folder folder(a.keep);
   options.folder = folder.path();
-  const Effort full{a.width, a.height, a.frames, 1, Effort{}.reference_step};
+  const Effort full{a.width, a.height, a.frames, 1};
   const Advice advice = advise(request, full, measure_by_running(experiment, request, options), progress);
 
   if (a.json) fmt::print("{}\n", advice_json(a, request, advice, scene).dump(2));

@@ -95,8 +95,9 @@ void print_context(const Way& way, const ContextProbe& p) {
   const GlContextInfo& i = p.info;
   fmt::print("  renderer            {} ({})\n  GL                  {}, GLSL {}\n", i.renderer,
              i.software ? "software" : "hardware", i.version, i.glsl_version);
-  fmt::print("  3D texture          {} texels an axis\n  storage block       {} bytes, {} bindings\n", i.max_3d_texture_size,
-             i.max_buffer_bytes, i.max_storage_bindings);
+  fmt::print("  3D texture          {} texels an axis, {}\n  storage block       {} bytes, {} bindings\n", i.max_3d_texture_size,
+             i.has_texture_limit() ? fmt::format("{} bytes", i.max_texture_bytes) : "no limit of bytes known", i.max_buffer_bytes,
+             i.max_storage_bindings);
   fmt::print("  texture units       {}\n  viewport            {} x {}\n  timer               {} bits\n", i.max_texture_units,
              i.max_viewport_width, i.max_viewport_height, i.timer_bits);
   fmt::print("  bindless textures   {}\n  shader ballot       {}\n  extensions          {}\n", i.bindless_texture ? "yes" : "no",

@@ -3,7 +3,9 @@
 #include "bench/cli/commands.hpp"
 #include "bench/measure/error_split.hpp"
 #include "bench/measure/scene_data.hpp"
+#include "bench/measure/value_resolution.hpp"
 #include "bench/settings/experiment.hpp"
+#include "bench/settings/settings_table.hpp"
 #include "renderers/bindings/scene_needs.hpp"
 #include "renderers/consumers/make_consumer.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
@@ -23,7 +25,7 @@ struct Arguments {
   bool explain_error = false;
   bool prune = false;
   bool json = false;
-  double reference_step = 0;
+  std::optional<double> reference_step, reference_tolerance;
   std::optional<double> tolerance;
 };
 
@@ -54,9 +56,22 @@ Scene with_tolerance(Scene scene, const std::optional<double>& tolerance) {
   return scene;
 }
 
-double reference_step(const Arguments& a, const Experiment& scene) {
-  if (a.reference_step > 0) return a.reference_step;
-  return scene.reference ? scene.reference->step : ReferenceSettings{}.step;
+/// Of the command line, else of the scene.
+ReferenceRule reference_rule(const Arguments& a, const Experiment& scene) {
+  if (a.reference_step && a.reference_tolerance)
+    throw UsageError("--reference-step stands in place of --reference-tolerance; accepted: one of both");
+  ReferenceSettings settings = scene.reference.value_or(ReferenceSettings{});
+  if (a.reference_tolerance) settings.step.reset();
+  const auto set = [&](const char* key, const char* option, const std::optional<double>& value) {
+    if (!value) return;
+    const Setting<ReferenceSettings>& row = *reference_settings().find(key);
+    if (const auto problem = value_problem(*value, row.key.type))
+      throw UsageError(fmt::format("{} {}: {}", option, *value, problem->text));
+    row.set(settings, *value);
+  };
+  set("step", "--reference-step", a.reference_step);
+  set("tolerance", "--reference-tolerance", a.reference_tolerance);
+  return settings.rule();
 }
 
 /// Sum of the causes' squared rmse: what shares are of.
@@ -126,8 +141,9 @@ int run(const Arguments& a) {
   const Encoding& encoding = find_encoding(build.encoding);
   require_support(encoding, request.context);
   EncodedField field = encoding.build(mesh, request);
+  for (const std::string& warning : value_resolution(field, drawn).warnings()) fmt::print(stderr, "warning: {}\n", warning);
   if (a.reference) {
-    write_picture(a, HierarchyReference(mesh, 0, field.definition).render(drawn, reference_step(a, scene)), scene, mesh);
+    write_picture(a, HierarchyReference(mesh, 0, field.definition).render(drawn, reference_rule(a, scene)), scene, mesh);
     return 0;
   }
   const Structure structure(*context, std::move(field), request);
@@ -136,10 +152,10 @@ int run(const Arguments& a) {
   const Picture picture = consumer->read();
   if (!a.output.empty()) write_picture(a, picture, scene, mesh);
   if (a.explain_error) {
-    const double step = reference_step(a, scene);
-    const Picture reference = HierarchyReference(mesh, 0, structure.field.definition).render(drawn, step);
+    const ReferenceRule rule = reference_rule(a, scene);
+    const Picture reference = HierarchyReference(mesh, 0, structure.field.definition).render(drawn, rule);
     const auto truth = analytic_field(scene.datasets[build.dataset]);
-    explain_error(a, {mesh, encoding, structure, *context, drawn, reference, picture, step, truth.get()});
+    explain_error(a, {mesh, encoding, structure, *context, drawn, reference, picture, rule, truth.get()});
   }
   return 0;
 }
@@ -155,7 +171,8 @@ void add_render_command(CLI::App& app, Command& chosen) {
   c->add_option("--memory-limit", a->memory_limit, "for the structure, as 512MiB");
   add_set_option(*c, a->set);
   c->add_flag("--reference", a->reference, "draw the double-precision reference of the filter instead");
-  c->add_option("--reference-step", a->reference_step, "its step, in widths of the finest cells");
+  c->add_option("--reference-tolerance", a->reference_tolerance, "its largest error, of full scale");
+  c->add_option("--reference-step", a->reference_step, "instead, a fixed step in widths of the finest cells, to compare with");
   c->add_option("--tolerance", a->tolerance,
                 "error asked of every channel, in (0, 1]: the steps follow; volumes, adaptive sampling");
   c->add_flag("--explain-error", a->explain_error, "print the picture's error by cause");

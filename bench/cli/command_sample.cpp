@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include "bench/cli/commands.hpp"
@@ -60,9 +62,22 @@ namespace {
 struct Sampled {
   Vec3d p;
   int level = -1;
-  std::optional<double> reference;
-  ProbeResult encoding_double, encoding_gl;
+  std::optional<double> reference{};
+  ProbeResult encoding_double{}, encoding_gl{};
+  std::optional<Vec3d> p_gl{};  ///< the point that the GL column is taken at, world
+  double off_gl = 0;            ///< of the largest coordinate of it, widths of the finest cells
 };
+
+/// What a context can be given of a position: a cell, and the fraction in float.
+FinestPosition as_floats(const FinestPosition& p) {
+  return {p.cell, Vec3d(glm::min(Vec3f(p.fraction), Vec3f(std::nextafter(1.0F, 0.0F))))};
+}
+
+void note_gl_point(const AmrHierarchy& mesh, const FinestPosition& exact, const FinestPosition& rounded, Sampled& sample) {
+  sample.p_gl = mesh.domain_lower() + (Vec3d(rounded.cell) + rounded.fraction) * mesh.spacing(mesh.finest_level());
+  const Vec3d off = glm::abs(rounded.fraction - exact.fraction);
+  sample.off_gl = std::max({off.x, off.y, off.z});
+}
 
 std::vector<Sampled> sample(const Arguments& a) {
   const Encoding& encoding = find_encoding(a.encoding);
@@ -82,21 +97,21 @@ std::vector<Sampled> sample(const Arguments& a) {
   const HierarchyReference reference(mesh, request.field, structure.field.definition);
 
   std::vector<Sampled> samples;
-  std::vector<FinestPosition> inside;
+  std::vector<FinestPosition> inside, rounded;
   std::vector<std::size_t> where;
   for (const Vec3d& p : points) {
-    samples.push_back({p, -1, std::nullopt, {}, {}});
-    auto position = finest_position(mesh, p);
+    samples.push_back({.p = p});
+    const auto position = finest_position(mesh, p);
     if (!position) continue;
-    // the point that every column is taken at: GL's, a cell and a fraction in float
-    position->fraction = Vec3d(glm::min(Vec3f(position->fraction), Vec3f(0.99999994F)));
+    rounded.push_back(as_floats(*position));
+    note_gl_point(mesh, *position, rounded.back(), samples.back());
     samples.back().reference = reference.sample(*position);
     if (const auto leaf = mesh.find_leaf(position->cell)) samples.back().level = leaf->level;
     inside.push_back(*position);
     where.push_back(samples.size() - 1);
   }
   const auto doubles = probe_on_cpu(mesh, exact_field, Precision::double_precision, inside);
-  const auto gl = probe_on_gl(*context, mesh, structure, inside);
+  const auto gl = probe_on_gl(*context, mesh, structure, rounded);
   for (std::size_t i = 0; i < inside.size(); ++i) {
     samples[where[i]].encoding_double = doubles[i];
     samples[where[i]].encoding_gl = gl[i];
@@ -115,17 +130,19 @@ int run(const Arguments& a) {
                       {"level", s.level < 0 ? Json(nullptr) : Json(s.level)},
                       {"reference", s.reference ? Json(*s.reference) : Json(nullptr)},
                       {"encoding_double", value_or_null(s.encoding_double)},
-                      {"encoding_gl", value_or_null(s.encoding_gl)}});
+                      {"encoding_gl", value_or_null(s.encoding_gl)},
+                      {"p_gl", s.p_gl ? Json({s.p_gl->x, s.p_gl->y, s.p_gl->z}) : Json(nullptr)}});
     fmt::print("{}\n", list.dump(1));
     return 0;
   }
   const auto text = [](bool found, double v) { return found ? fmt::format("{:.9g}", v) : std::string("-"); };
-  fmt::print("{:>12} {:>12} {:>12} {:>5} {:>16} {:>16} {:>16}\n", "x", "y", "z", "level", "reference", "encoding double",
-             "encoding GL");
+  fmt::print("{:>12} {:>12} {:>12} {:>5} {:>16} {:>16} {:>16} {:>12}\n", "x", "y", "z", "level", "reference", "encoding double",
+             "encoding GL", "GL point off");
   for (const Sampled& s : samples)
-    fmt::print("{:12.6g} {:12.6g} {:12.6g} {:>5} {:>16} {:>16} {:>16}\n", s.p.x, s.p.y, s.p.z,
+    fmt::print("{:12.6g} {:12.6g} {:12.6g} {:>5} {:>16} {:>16} {:>16} {:>12}\n", s.p.x, s.p.y, s.p.z,
                s.level < 0 ? "-" : std::to_string(s.level), text(s.reference.has_value(), s.reference.value_or(0)),
-               text(s.encoding_double.found, s.encoding_double.value), text(s.encoding_gl.found, s.encoding_gl.value));
+               text(s.encoding_double.found, s.encoding_double.value), text(s.encoding_gl.found, s.encoding_gl.value),
+               s.p_gl ? fmt::format("{:.2g}", s.off_gl) : "-");
   return 0;
 }
 
@@ -145,6 +162,9 @@ void add_sample_command(CLI::App& app, Command& chosen) {
   c->add_option("--context", a->context, "egl, egl_device or osmesa");
   c->add_flag("--json", a->json, "for programs");
   c->footer(
+      "Reference and encoding double are taken at the point itself. A GL context is given a cell and a fraction of it in float: "
+      "the "
+      "column GL point off (widths of the finest cells), with --json the key p_gl (world), tells where that is.\n\n"
       "Example: amrtex sample data/amrex_tiny/plt00008 --encoding page_table --filter linear_page --parameter page_size=8 "
       "--points points.txt");
   c->callback([a, &chosen] { chosen = [a] { return run(*a); }; });

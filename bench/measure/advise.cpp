@@ -420,7 +420,7 @@ Measure measure_by_running(const Experiment& scene, const AdviceRequest& request
   const std::string data = exact_data_hash(load_dataset(scene, scene.datasets.front()), scene_of(scene, scene.renders.front()));
   return [scene, request, options, data](std::span<const Candidate> candidates, const Effort& effort) {
     Experiment experiment = scene;
-    experiment.reference = ReferenceSettings{effort.reference_step, request.reference, !request.reference};
+    experiment.reference = ReferenceSettings{.common_filter = request.reference, .own = !request.reference};
     experiment.unchecked_because = "advise reads the error itself";
     if (options.context) experiment.context = context_kind_name(*options.context);
     if (request.memory_limit != std::numeric_limits<std::int64_t>::max()) experiment.memory_limit = request.memory_limit;

@@ -38,7 +38,6 @@ struct Effort {
   int width = 512, height = 512;  ///< pixels
   int frames = 5;
   int warm_up = 1;
-  double reference_step = 0.125;  ///< widths of the finest cells
 };
 
 /// A record (bench/records/record.hpp) for each candidate, in their order.

@@ -1,9 +1,9 @@
 #include "bench/measure/change_time.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
+#include "bench/measure/stopwatch.hpp"
 #include "renderers/consumers/scene_resources.hpp"
 #include "structures/mesh/error.hpp"
 
@@ -69,11 +69,11 @@ ChangeTimes time_changes(Context& context, const DomainGeometry& geometry, const
   result.bytes = uploaded_bytes(before, after);
   for (int i = 0; i < times; ++i) {
     context.gl().Finish();
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     const SceneResources resources(context, geometry, field, i % 2 == 0 ? other : scene);
     resources.bind(program, structure.gpu);
     context.gl().Finish();
-    result.wall_ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+    result.wall_ms.push_back(watch.seconds() * 1000);
   }
   context.check("changing the transfer function");
   return result;

@@ -38,9 +38,9 @@ constexpr double kRounding = 1e-6;
 
 /// Does the field jump inside an interval? A midpoint says nothing about what lies behind a jump, so the order falls to one.
 bool jumps(Filter filter, Sampling sampling) {
-  if (filter == Filter::nearest) return true;
+  const Continuity where = filter_info(filter).continuity;
   // adaptive intervals end where the level changes
-  return sampling == Sampling::lattice && (filter == Filter::linear_lod || filter == Filter::linear_page);
+  return where == Continuity::cell || (sampling == Sampling::lattice && where != Continuity::everywhere);
 }
 
 bool has_volume(const RenderSettings& s) { return s.mode != Mode::iso && (s.draws_volume() || !s.draws_surfaces()); }

@@ -152,7 +152,7 @@ ErrorSplit split_error(const SplitRequest& r) {
   split.causes = std::move(chain).causes();
   if (r.truth != nullptr && !r.scene.settings.draws_surfaces() && r.scene.more_fields.empty()) {
     const HierarchyReference reference(r.hierarchy, r.structure.request.field, r.structure.field.definition);
-    split.filter = compare(r.reference, reference.render(r.scene, r.reference_step, *r.truth));
+    split.filter = compare(r.reference, reference.render(r.scene, r.rule, *r.truth));
   }
   return split;
 }

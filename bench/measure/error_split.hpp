@@ -9,6 +9,7 @@
 #include "bench/numbers/image_error.hpp"
 #include "renderers/context/context.hpp"
 #include "renderers/gpu/structure.hpp"
+#include "renderers/scene/reference_rule.hpp"
 #include "renderers/scene/scene.hpp"
 #include "structures/generators/synthetic.hpp"
 
@@ -23,7 +24,7 @@ struct SplitRequest {
   const Scene& scene;
   const Picture& reference;              ///< the double reference of the field's own filter
   const Picture& picture;                ///< of the context: what is judged
-  double reference_step = 0.0625;        ///< widths of the finest cells, for the analytic field
+  ReferenceRule rule = {};               ///< for the analytic field
   const AnalyticField* truth = nullptr;  ///< that the mesh samples; null where there is none
 };
 

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <vector>
 
-#include "bench/measure/cached_reference.hpp"
 #include "bench/measure/check_bound.hpp"
 #include "bench/measure/error_split.hpp"
+#include "bench/measure/reference_cache.hpp"
 #include "bench/measure/scene_data.hpp"
 #include "bench/numbers/statistics.hpp"
 #include "bench/records/record.hpp"
@@ -43,12 +43,18 @@ Scene reference_scene(const JudgedPicture& judged) {
   return scene;
 }
 
+/// From the cache, where it was drawn before.
+ReferencePicture reference_of(const JudgedPicture& judged, const Scene& scene, const FilterDefinition& filter, std::string& hash) {
+  const AmrHierarchy& mesh = judged.data.mesh();
+  return cached_reference({mesh, exact_data_hash(mesh, scene), filter, scene, judged.experiment.reference->rule()}, judged.references,
+                          hash);
+}
+
 Json common_error(const JudgedPicture& judged, Filter filter) {
   FilterDefinition common{filter, 0, judged.data.mesh().finest_level()};
   if (!common.has_pages()) common.page_level = 0;
   std::string hash;
-  const Picture shared = cached_reference(judged.data.mesh(), common, reference_scene(judged), judged.experiment.reference->step,
-                                          judged.references, hash);
+  const Picture shared = reference_of(judged, reference_scene(judged), common, hash).picture;
   Json error = error_json(compare(judged.picture, shared), hash);
   error["p95"] = percentile(pixel_errors(judged.picture, shared), 0.95);
   error["p95_seen"] = percentile(seen_errors(judged.picture, shared), 0.95);
@@ -59,10 +65,9 @@ Json common_error(const JudgedPicture& judged, Filter filter) {
 /// The error by cause.
 Json explain(const JudgedPicture& judged, const Picture& reference) {
   const auto truth = analytic_field(judged.data.source());
-  const double step = judged.experiment.reference->step;
   const Encoding& encoding = find_encoding(judged.structure.field.encoding);
   return split_json(split_error({judged.data.mesh(), encoding, judged.structure, judged.context, judged.scene, reference,
-                                 judged.picture, step, truth.get()}));
+                                 judged.picture, judged.experiment.reference->rule(), truth.get()}));
 }
 
 /// What the level of detail did: the picture against that of the same structure without it.
@@ -76,10 +81,12 @@ Json pruning_error(const JudgedPicture& judged) {
   return {{"rmse", error.rmse}, {"max", error.max}};
 }
 
-Json own_error(const JudgedPicture& judged, const ErrorMetrics& metrics, const Picture& own, const std::string& hash) {
+Json own_error(const JudgedPicture& judged, const ErrorMetrics& metrics, const ReferencePicture& drawn, const std::string& hash) {
+  const Picture& own = drawn.picture;
   const RenderSettings& settings = judged.scene.settings;
   Json error = error_json(metrics, hash);
-  for (const char* unknown : {"reference_error", "limited_by_reference", "within_tolerance_seen"}) error[unknown] = nullptr;
+  error["within_tolerance_seen"] = nullptr;
+  add_reference_error(error, drawn, metrics);
   error["split"] = judged.experiment.explain_error ? explain(judged, own) : Json();
   if (!judged.experiment.explain_error && settings.prunes_levels()) error["split"]["level_of_detail"] = pruning_error(judged);
   const std::vector<double> pixels = pixel_errors(judged.picture, own);
@@ -101,11 +108,10 @@ std::optional<Judgement> add_errors(Json& record, const JudgedPicture& judged) {
   if (reference.common_filter) record["error_common"] = common_error(judged, *reference.common_filter);
   if (!reference.own) return std::nullopt;
   std::string hash;
-  Picture own = cached_reference(judged.data.mesh(), judged.structure.field.definition, reference_scene(judged), reference.step,
-                                 judged.references, hash);
-  const ErrorMetrics error = compare(judged.picture, own);
+  ReferencePicture own = reference_of(judged, reference_scene(judged), judged.structure.field.definition, hash);
+  const ErrorMetrics error = compare(judged.picture, own.picture);
   record["error"] = own_error(judged, error, own, hash);
-  return Judgement{error, std::move(own)};
+  return Judgement{error, std::move(own.picture)};
 }
 
 bool add_check(Json& record, const Experiment& experiment, const BuildPoint& build, const RenderSettings& settings,

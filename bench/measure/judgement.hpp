@@ -20,7 +20,7 @@ struct JudgedPicture {
   Context& context;
   const Scene& scene;
   const Picture& picture;
-  std::filesystem::path references;  ///< folder of reference pictures (cached_reference.hpp)
+  std::filesystem::path references;  ///< folder of reference pictures (reference_cache.hpp)
 };
 
 /// What a picture is against its own reference.

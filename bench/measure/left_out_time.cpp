@@ -1,7 +1,6 @@
 #include "bench/measure/left_out_time.hpp"
 
-#include <chrono>
-
+#include "bench/measure/stopwatch.hpp"
 #include "bench/numbers/statistics.hpp"
 #include "structures/mesh/error.hpp"
 
@@ -9,9 +8,9 @@ namespace amrtex {
 namespace {
 
 double build_seconds(const Encoding& encoding, const AmrHierarchy& h, const BuildRequest& request) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const EncodedField built = encoding.build(h, request);
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return watch.seconds();
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "bench/measure/left_out_time.hpp"
 #include "bench/measure/scene_data.hpp"
 #include "bench/measure/stopwatch.hpp"
+#include "bench/measure/value_resolution.hpp"
 #include "bench/records/record.hpp"
 #include "renderers/bindings/scene_needs.hpp"
 #include "renderers/consumers/make_consumer.hpp"
@@ -165,6 +166,10 @@ Json PointMeasurer::measure_one(const BuildPoint& build, Built& built, const Ren
   if (!scene.settings.triangles.empty()) record["triangle_seconds"] = consumer->triangle_seconds();
   record["image_hash"] = picture_hash(picture);
   record["context"]["shader_hash"] = consumer->shader_hash();
+  if (const ValueResolution resolution = value_resolution(built.structure.field, scene); !resolution.fine()) {
+    record["value_resolution"] = resolution.json();
+    for (const std::string& text : resolution.warnings()) warn(record, text);
+  }
   add_warnings(record, scene, *consumer);
   options_.phase(Phase::other);
   const std::optional<Judgement> own = timed(shares_, Share::references, [&] {

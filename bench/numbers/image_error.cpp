@@ -35,6 +35,25 @@ bool same_special(double v, double r) { return (std::isnan(v) && std::isnan(r)) 
                           pixel / width, index % channels, v, r));
 }
 
+double largest_difference(const Picture& picture, const Picture& reference) {
+  double largest = 0;
+  for (std::size_t i = 0; i < picture.values.size(); ++i) {
+    const double v = picture.values[i], r = reference.values[i];
+    if (std::isfinite(v) && std::isfinite(r))
+      largest = std::max(largest, std::abs(v - r));
+    else if (!same_special(v, r))
+      throw_special(picture, i, v, r);
+  }
+  return largest;
+}
+
+/// A power of two in which differences up to `largest` have squares that are doubles; 1 where they have them as they are.
+double square_unit(double largest) {
+  constexpr int kSquare = 400;  // exponents of what is squared as it is
+  const int exponent = largest > 0 ? std::ilogb(largest) : 0;
+  return std::abs(exponent) <= kSquare ? 1 : std::ldexp(1.0, exponent);
+}
+
 double finite_range(const Picture& picture) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const double v : picture.values) {
@@ -50,21 +69,19 @@ double finite_range(const Picture& picture) {
 ErrorMetrics compare(const Picture& picture, const Picture& reference) {
   require_same_shape(picture, reference);
   ErrorMetrics error;
+  error.max = largest_difference(picture, reference);
+  const double unit = square_unit(error.max);
   double sum = 0, relative_sum = 0;
   for (std::size_t i = 0; i < picture.values.size(); ++i) {
     const double v = picture.values[i], r = reference.values[i];
-    if (!std::isfinite(v) || !std::isfinite(r)) {
-      if (!same_special(v, r)) throw_special(picture, i, v, r);
-      continue;
-    }
-    const double difference = std::abs(v - r);
-    error.max = std::max(error.max, difference);
+    if (!std::isfinite(v) || !std::isfinite(r)) continue;
+    const double difference = std::abs(v - r) / unit, offset = (r + kMrseOffset) / unit;
     sum += difference * difference;
-    const double relative = (difference * difference) / ((r + kMrseOffset) * (r + kMrseOffset));
+    const double relative = (difference * difference) / (offset * offset);
     if (std::isfinite(relative)) relative_sum += relative;
   }
   const double n = static_cast<double>(picture.values.size());
-  error.rmse = std::sqrt(sum / n);
+  error.rmse = unit * std::sqrt(sum / n);
   error.mrse = relative_sum / n;
   const double peak = picture.channels == 1 ? finite_range(reference) : 1;
   if (error.rmse > 0 && peak > 0) error.psnr_db = 20 * std::log10(peak / error.rmse);

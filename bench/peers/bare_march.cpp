@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "bench/measure/scene_data.hpp"
+#include "bench/measure/stopwatch.hpp"
 #include "renderers/bindings/scene_needs.hpp"
 #include "renderers/consumers/raycaster.hpp"
 #include "renderers/gpu/draw_target.hpp"
@@ -37,13 +38,13 @@ class BareMarch {
     program_.bind_texture("tex_dense", dense_.id());
     program_.bind_texture("tex_transfer", transfer_.id());
     context_.gl().Finish();
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     timer_.begin();
     target_.draw(program_);
     timer_.end();
     context_.gl().Finish();
-    const std::chrono::duration<double, std::milli> wall = std::chrono::steady_clock::now() - start;
-    return {wall.count(), timer_.milliseconds()};
+    const double wall_ms = watch.seconds() * 1000;
+    return {wall_ms, timer_.milliseconds()};
   }
 
  private:

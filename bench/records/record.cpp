@@ -243,7 +243,7 @@ void check_split(const Json& error) {
     }
     for (const char* key : {"rmse", "max"})
       if (!difference.is_object() || !difference.contains(key) || !difference.at(key).is_number())
-        fail(fmt::format("/error/split/{}/{}", cause, key), "a number is expected");
+        fail(fmt::format("/error/split/{}/{}", clipped(cause), key), "a number is expected");
   }
 }
 

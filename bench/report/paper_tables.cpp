@@ -131,7 +131,7 @@ std::optional<Amount> amount_at(const Json& record, const std::string& pointer, 
   if (json.is_number()) return Amount{json.get<double>(), std::nullopt, json.is_number_integer()};
   const Json median = at(json, "/median"), mad = at(json, "/mad");
   if (!median.is_number() || !mad.is_number())
-    node.fail(fmt::format("{} is no number in a record; accepted: a number, or a timing as /frame/wall_ms", pointer));
+    node.fail(fmt::format("{} is no number in a record; accepted: a number, or a timing as /frame/wall_ms", clipped(pointer)));
   return Amount{median.get<double>(), mad.get<double>(), false};
 }
 

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "renderers/scene/reference_rule.hpp"
 #include "renderers/scene/scene.hpp"
 #include "structures/common/encoding.hpp"
 
@@ -49,12 +50,15 @@ struct RenderPoint {
 
 /// What pictures are judged by. `error` is always against a point's own filter.
 struct ReferenceSettings {
-  double step = 0.0625;  ///< widths of the finest cells
+  double tolerance = ReferenceTolerance{}.value;  ///< of full scale, in dvr and dvr_iso
+  std::optional<double> step{};                   ///< in its place: a fixed one, widths of the finest cells
   /// Filter of `error_common`; absent ("own" in the file) leaves that out. `linear_page`
   /// stands for one page of the finest level, the dense field.
   std::optional<Filter> common_filter = Filter::linear_vertex;
   bool own = true;                   ///< false: no `error`, which takes a reference of its own for each filter and page size
   std::optional<Shading> shading{};  ///< normals that isosurfaces are judged by; absent: those of the picture's own `shading`
+
+  ReferenceRule rule() const { return step ? ReferenceRule(*step) : ReferenceRule(ReferenceTolerance{tolerance}); }
 };
 
 struct Experiment {

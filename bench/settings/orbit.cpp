@@ -54,9 +54,7 @@ SettingTable<Orbit> make_settings() {
       {{.name = "axis", .type = three, .reference = AffectsReference::yes, .help = "not all 0; also `up` of each view"},
        [](const Orbit& o) { return list_of_numbers(o.axis); },
        [](Orbit& o, const Json& v) { o.axis = vector(v); },
-       [](const Orbit& o) -> std::string {
-         return glm::length(o.axis) > 0 ? "" : "accepted: three numbers [x, y, z], not all 0";
-       }});
+       [](const Orbit& o) -> std::string { return o.axis != Vec3d(0) ? "" : "accepted: three numbers [x, y, z], not all 0"; }});
   rows.push_back({{.name = "elevation",
                    .type = elevation,
                    .reference = AffectsReference::yes,
@@ -76,9 +74,11 @@ const SettingTable<Orbit>& settings() {
   return settings;
 }
 
+double largest_component(const Vec3d& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
+
 Orbit read_orbit(const Json& json) {
   Orbit orbit = settings().parse(json, "'orbit'");
-  orbit.axis = glm::normalize(orbit.axis);
+  orbit.axis = glm::normalize(orbit.axis / largest_component(orbit.axis));  // scaled first: its square may be no number
   return orbit;
 }
 

@@ -18,6 +18,8 @@ void parse_reference(ExperimentParser& parser) {
     return;
   }
   node->accept_keys(names_of(reference_settings().keys()));
+  if (const auto step = node->find("step"); step && !step->json().is_null() && node->find("tolerance"))
+    step->fail("stands in place of 'tolerance'; accepted: one of both");
   read_settings(*node, members_of(*node), reference_settings(), *parser.experiment.reference);
 }
 

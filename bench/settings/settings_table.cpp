@@ -141,16 +141,15 @@ SettingTable<RenderPoint> make_frame_settings() {
 
 SettingTable<BuildPoint> make_build_settings() {
   std::vector<Setting<BuildPoint>> rows;
-  rows.push_back(
-      {{.name = "filters",
-        .type = choice_type(filter_names()),
-        .reference = AffectsReference::yes,
-        .help = "the field between cell values ([shaders/README.md](../shaders/README.md#filters)). One that an encoding lacks "
-                "gives a record `unsupported`",
-        .record_name = "filter",
-        .column = {"filter"}},
-       [](const BuildPoint& b) -> Json { return filter_name(b.filter); },
-       [](BuildPoint& b, const Json& v) { b.filter = parse_filter(v.get<std::string>()); }});
+  rows.push_back({{.name = "filters",
+                   .type = choice_type(filter_names()),
+                   .reference = AffectsReference::yes,
+                   .help = "the field between cell values ([docs/filters.md](filters.md)). One that an encoding lacks "
+                           "gives a record `unsupported`",
+                   .record_name = "filter",
+                   .column = {"filter"}},
+                  [](const BuildPoint& b) -> Json { return filter_name(b.filter); },
+                  [](BuildPoint& b, const Json& v) { b.filter = parse_filter(v.get<std::string>()); }});
   rows.push_back({{.name = "storage",
                    .type = choice_type(storage_names()),
                    .reference = AffectsReference::no,
@@ -173,13 +172,26 @@ SettingTable<ReferenceSettings> make_reference_settings() {
   std::vector<std::string> filters = {"own"};
   for (const std::string& name : filter_names()) filters.push_back(name);
   std::vector<Setting<ReferenceSettings>> rows;
-  rows.push_back({{.name = "step",
-                   .type = number_above(0),
-                   .reference = AffectsReference::yes,
-                   .help = "largest part of an interval, of the finest level's cells",
-                   .unit = "cell widths"},
-                  [](const ReferenceSettings& r) -> Json { return r.step; },
-                  [](ReferenceSettings& r, const Json& v) { r.step = v.get<double>(); }});
+  rows.push_back(
+      {{.name = "tolerance",
+        .type = number_type(ReferenceTolerance::kLeast, 1),
+        .reference = AffectsReference::yes,
+        .help = fmt::format("largest error of the reference in `dvr` and `dvr_iso`, of full scale: rays are integrated until "
+                            "their own estimate is below it. That of `projection` and `mip` is {} of the integral of |f| "
+                            "and of the largest |f| along the ray",
+                            Json(kLineTolerance).dump()),
+        .takes = {{"step", {nullptr}, Otherwise::idle}}},
+       [](const ReferenceSettings& r) -> Json { return r.tolerance; },
+       [](ReferenceSettings& r, const Json& v) { r.tolerance = v.get<double>(); }});
+  rows.push_back(
+      {{.name = "step",
+        .type = number_above(0).or_null(),
+        .reference = AffectsReference::yes,
+        .help = "in place of `tolerance`, to compare with: parts of at most this length, of an error that is not known",
+        .unit = "cell widths",
+        .default_text = "by `tolerance`"},
+       [](const ReferenceSettings& r) { return r.step ? Json(*r.step) : Json(); },
+       [](ReferenceSettings& r, const Json& v) { r.step = v.is_null() ? std::nullopt : std::optional(v.get<double>()); }});
   rows.push_back(
       {{.name = "filter",
         .type = choice_type(filters),

@@ -104,7 +104,7 @@ struct LinearMedium {
 void linear_medium(VerifyContext& v) {
   const AmrHierarchy h = MeshBuilder(Vec3i(16)).root([](const Vec3d& p) { return p.x; }).hierarchy();
   v.for_each_filter("2 linear extinction, order of the light, double", [&](const EncodingCase& c) -> Verdict {
-    if (c.filter == Filter::nearest) return NotAsked{kCellwise};
+    if (!interpolates(c.filter)) return NotAsked{kCellwise};
     const EncodedField field = v.build(h, c, {.storage = Storage::r64f, .value_ranges = false});
     std::vector<double> errors;
     double depth = 0;
@@ -116,7 +116,7 @@ void linear_medium(VerifyContext& v) {
     return all_of(std::array{near(observed_order(errors), 2, 0.1), at_most(depth, 1e-12), at_most(errors[0], 1e-3)});
   });
   v.for_each_filter("2 linear extinction, GL", [&](const EncodingCase& c) -> Verdict {
-    if (c.filter == Filter::nearest) return NotAsked{kCellwise};
+    if (!interpolates(c.filter)) return NotAsked{kCellwise};
     const Scene s = LinearMedium::scene(1.0 / 32);
     const Picture p = draw(v.gl(), h, v.build(h, c, {.value_ranges = false}), s);
     return at_most(std::abs(p.pixel(2, 2)[0] - LinearMedium::light()), 1e-5);
@@ -156,7 +156,7 @@ void slab_stack(VerifyContext& v) {
     return at_most(error(draw(v.gl(), h, v.build(h, c), s)), 1e-5);
   });
   v.for_each_filter("2 control: stack of slabs, interpolated", [&](const EncodingCase& c) -> Verdict {
-    if (c.filter == Filter::nearest) return NotAsked{"nothing is interpolated"};
+    if (!interpolates(c.filter)) return NotAsked{"nothing is interpolated"};
     Scene between = s;  // samples at the cells' centres would see the slabs' own values
     between.settings.step = 0.5;
     return above(error(render_on_cpu(h, v.build(h, c, {.storage = Storage::r64f}), between, true)), 1e-3);

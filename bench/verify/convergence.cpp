@@ -84,7 +84,7 @@ void step_refinement(VerifyContext& v) {
   const std::vector<double> steps = halved(1.0 / 16, v.size(4, 5));
   for (const Rule& rule : kRules)
     v.for_each_filter("3 " + rule.name() + ": step refinement of a smooth field", [&](const EncodingCase& c) -> Verdict {
-      if (c.filter == Filter::nearest) return NotAsked{kJumpsAtCells};
+      if (!interpolates(c.filter)) return NotAsked{kJumpsAtCells};
       return order_near(step_errors(v, h, c, gentle_scene(rule.integrator), steps), rule.order);
     });
 }
@@ -95,7 +95,7 @@ void level_jump(VerifyContext& v) {
   for (const Rule& rule : kRules)
     v.for_each_filter("4 " + rule.name() + ": step refinement across level jumps, intervals split there",
                       [&](const EncodingCase& c) -> Verdict {
-                        if (c.filter == Filter::nearest) return NotAsked{kJumpsAtCells};
+                        if (!interpolates(c.filter)) return NotAsked{kJumpsAtCells};
                         return order_near(step_errors(v, h, c, gentle_scene(rule.integrator), steps), rule.order);
                       });
   // linear, so that each level alone has no error of order 1: all that there is to see are the jumps between levels
@@ -124,17 +124,17 @@ void transfer_steps(VerifyContext& v) {
   const std::vector<TransferFunction::ExtinctionPoint> jump{{0.75, 0}, {0.75 + 1e-7, 12}};
   const std::vector<TransferFunction::ExtinctionPoint> peak{{0.74, 0}, {0.75, 80}, {0.76, 0}};
   v.for_each_filter("5 step of the transfer function, preintegrated", [&](const EncodingCase& c) -> Verdict {
-    if (c.filter == Filter::nearest) return NotAsked{kJumpsAtCells};
+    if (!interpolates(c.filter)) return NotAsked{kJumpsAtCells};
     return order_near(step_errors(v, h, c, scene(Integrator::preintegrated, jump), halved(1.0 / 16, v.size(5, 7))), 2);
   });
   // Once intervals resolve the peak; before, see the spike of the suite `stiff`. What its two sides are off cancels in part.
   v.for_each_filter("5 peak of width 0.02, preintegrated", [&](const EncodingCase& c) -> Verdict {
-    if (c.filter == Filter::nearest) return NotAsked{kJumpsAtCells};
+    if (!interpolates(c.filter)) return NotAsked{kJumpsAtCells};
     return order_at_least(step_errors(v, h, c, scene(Integrator::preintegrated, peak), halved(1.0 / 64, v.size(5, 6))), 1.9);
   });
   const std::vector<double> steps = halved(1.0 / 16, v.size(5, 7));
   v.for_each_filter("5 control: step of the transfer function, classified at samples", [&](const EncodingCase& c) -> Verdict {
-    if (c.filter == Filter::nearest) return NotAsked{kJumpsAtCells};
+    if (!interpolates(c.filter)) return NotAsked{kJumpsAtCells};
     return order_near(step_errors(v, h, c, scene(Integrator::exponential_midpoint, jump), steps), 1, 0.25);
   });
 }
@@ -218,7 +218,7 @@ void grid_refinement(VerifyContext& v) {
   const auto inside = places_in(Vec3d(0.2), Vec3d(0.8));
   v.for_each_filter("8 grid refinement, one level, largest error inside", [&](const EncodingCase& c) {
     const auto one_level = [](int n) { return MeshBuilder(Vec3i(n)).root(smooth).hierarchy(); };
-    return order_near(errors_of(c, one_level, inside), c.filter == Filter::nearest ? 1 : 2);
+    return order_near(errors_of(c, one_level, inside), interpolates(c.filter) ? 2 : 1);
   });
   // just above and below the face x = 1/2 between both levels
   std::vector<Vec3d> boundary;
@@ -255,14 +255,14 @@ void grid_refinement(VerifyContext& v) {
       errors.push_back(rms_difference(render_on_cpu(h, v.build(h, c, {.storage = Storage::r64f}), s, true), exact));
     }
     // the cells of nearest that an oblique ray meets are off by h of either sign: more than 1, less than 2
-    return order_at_least(errors, c.filter == Filter::nearest ? 1.5 : 1.75);
+    return order_at_least(errors, interpolates(c.filter) ? 1.75 : 1.5);
   });
 }
 
 void pixel_refinement(VerifyContext& v) {
   const AmrHierarchy h = MeshBuilder(Vec3i(16)).root(smooth).hierarchy();
   v.for_each_filter("13 pixel refinement, successive pictures", [&](const EncodingCase& c) -> Verdict {
-    if (c.filter == Filter::nearest) return NotAsked{kJumpsAtCells};
+    if (!interpolates(c.filter)) return NotAsked{kJumpsAtCells};
     const EncodedField field = v.build(h, c, {.storage = Storage::r64f});
     const auto picture = [&](int pixels) {
       Scene s = small_scene(Mode::projection, orthographic(Vec3d(0.5), {1, 0.1, 0.2}, 0.4), Sampling::adaptive, pixels);
@@ -343,19 +343,19 @@ void isosurfaces(VerifyContext& v) {
   };
   constexpr const char* kStairs = "its surface is made of cells' faces";
   v.for_each_filter("25 isosurface, position", [&](const EncodingCase& c) -> Verdict {
-    if (c.filter == Filter::nearest) return NotAsked{kStairs};
+    if (!interpolates(c.filter)) return NotAsked{kStairs};
     return order_near(inside(c, Output::depth), 2);
   });
   v.for_each_filter("25 isosurface, normal, at least 1", [&](const EncodingCase& c) -> Verdict {
-    if (c.filter == Filter::nearest) return NotAsked{kStairs};
+    if (!interpolates(c.filter)) return NotAsked{kStairs};
     return order_at_least(inside(c, Output::normal), 1);
   });
   v.for_each_filter("25 isosurface at a level boundary, position", [&](const EncodingCase& c) -> Verdict {
-    if (c.filter == Filter::nearest) return NotAsked{kStairs};
+    if (!interpolates(c.filter)) return NotAsked{kStairs};
     return order_at_least(at_boundary(c, Output::depth), 0.9);
   });
   v.for_each_filter("24 gradient inside, direction", [&](const EncodingCase& c) -> Verdict {
-    if (c.filter == Filter::nearest) return NotAsked{kStairs};
+    if (!interpolates(c.filter)) return NotAsked{kStairs};
     return order_near(inside(c, Output::normal), 2);
   });
   // a filter whose values jump at a boundary has no order left for their differences
@@ -366,7 +366,7 @@ void isosurfaces(VerifyContext& v) {
   });
   v.for_each_filter("24 control: gradient at a level boundary, filters whose values jump there",
                     [&](const EncodingCase& c) -> Verdict {
-                      if (c.filter == Filter::nearest) return NotAsked{kStairs};
+                      if (!interpolates(c.filter)) return NotAsked{kStairs};
                       if (is_continuous(c)) return NotAsked{"its values do not jump"};
                       return order_below(at_boundary(c, Output::normal), 0.9);
                     });

@@ -73,7 +73,7 @@ void points_on_gl(VerifyContext& v) {
                                c.filter == Filter::nearest ? "equal to the bit" : "<= 1e-6 of the range");
              });
   v.for_each_filter("11 every kind of place, GL, texture filter", [&](const EncodingCase& c) -> Verdict {
-    if (c.filter == Filter::nearest) return NotAsked{"no texture filter takes part"};
+    if (!interpolates(c.filter)) return NotAsked{"no texture filter takes part"};
     return compared(on_gl(v, h, v.build(h, c, {.filtering = Filtering::hardware}), at), "<= 2^-12 of the local range");
   });
   v.for_each_filter("11 control: values two per cent off", [&](const EncodingCase& c) {
@@ -270,7 +270,7 @@ void machines(VerifyContext& v) {
   v.for_each_filter("26 GL against the same text in double, a pixel", [&](const EncodingCase& c) {
     const Picture exact = render_on_cpu(h, v.build(h, c, {.storage = Storage::r64f}), s, true);
     const Picture gl = draw(v.gl(), h, v.build(h, c), s);
-    return at_most(difference(gl, exact), c.filter == Filter::nearest ? 2 * value_range(h) * step : 1e-4);
+    return at_most(difference(gl, exact), interpolates(c.filter) ? 1e-4 : 2 * value_range(h) * step);
   });
   v.for_each_filter("26 GL against the reference, a pixel, adaptive, step 1/16", [&](const EncodingCase& c) {
     Scene fine = wave_scene(Mode::projection, Sampling::adaptive);

@@ -98,7 +98,7 @@ void deep_rays(VerifyContext& v, const std::string& name, const AmrHierarchy& h,
       const Vec3d middle = s.view.at;
       s.region = {middle - 16.0 * finest, middle + 16.0 * finest};
       // an interval over cells' faces has the value of one side: shorter ones where values jump at all of them
-      if (c.filter == Filter::nearest) s.settings.step = 1.0 / 128;
+      if (!interpolates(c.filter)) s.settings.step = 1.0 / 128;
       const Picture got = on_gl ? draw(v.gl(), h, field, s) : render_on_cpu(h, field, s, true);
       worst = std::max(worst, rms_difference(got, reference.render(s, 1.0 / 32)) / finest.x);
     }
@@ -223,10 +223,10 @@ void spaces(VerifyContext& v) {
       return at_most(
           difference(render_on_cpu(h, v.build(h, c, {.storage = Storage::r64f}), scene_of(s, Sampling::adaptive), true),
                      expected),
-          c.filter == Filter::nearest ? 0.05 : 1e-6);  // of nearest one sample may take the next cell
+          interpolates(c.filter) ? 1e-6 : 0.05);  // of nearest one sample may take the next cell
     });
     v.for_each_filter("19 " + s.name + ": the picture of the unit cube, GL", [&](const EncodingCase& c) -> Verdict {
-      if (c.filter == Filter::nearest) return NotAsked{"a ray an ulp away may cut other corners of cells"};
+      if (!interpolates(c.filter)) return NotAsked{"a ray an ulp away may cut other corners of cells"};
       const Picture expected = draw(v.gl(), plain, v.build(plain, c), scene_of(unit, Sampling::adaptive));
       return at_most(difference(draw(v.gl(), h, v.build(h, c), scene_of(s, Sampling::adaptive)), expected), 1e-4);
     });

@@ -54,7 +54,7 @@ Picture flipped(const Picture& p) {
 }
 
 /// The difference that an ulp of a ray makes: with nearest, one sample in the next cell.
-double tolerance(const EncodingCase& c) { return c.filter == Filter::nearest ? 0.05 : 1e-6; }
+double tolerance(const EncodingCase& c) { return interpolates(c.filter) ? 1e-6 : 0.05; }
 
 void placements(VerifyContext& v) {
   const AmrHierarchy h = mesh(kAxes, kPlain, 1, waves);
@@ -128,7 +128,7 @@ void directions(VerifyContext& v) {
     for (int y = 0; y < kPixels; ++y)
       for (int x = 0; x < kPixels; ++x) worst = std::max(worst, std::abs(there.pixel(x, y)[3] - back.pixel(x, y)[3]));
     // positions lie half a quantum of 2^-12 cells to one side: slope of the field times extinction times length
-    return at_most(worst, c.filter == Filter::nearest ? 1e-6 : 2e-3);
+    return at_most(worst, interpolates(c.filter) ? 2e-3 : 1e-6);
   });
   v.for_each_filter("23 two halves of the domain, composited, double", [&](const EncodingCase& c) {
     const EncodedField field = v.build(h, c, {.storage = Storage::r64f});

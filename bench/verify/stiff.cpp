@@ -73,7 +73,7 @@ void stiff_integrators(VerifyContext& v) {
   for (const Integrator integrator : {Integrator::left, Integrator::preintegrated, Integrator::tolerance})
     v.for_each_filter(fmt::format("6 extinction times length from 0 to infinity, {}, double", integrator_name(integrator)),
                       [&](const EncodingCase& c) -> Verdict {
-                        if (integrator == Integrator::tolerance && c.filter == Filter::nearest)
+                        if (integrator == Integrator::tolerance && !interpolates(c.filter))
                           return NotAsked{"tolerance follows fields that are not constant in cells"};
                         const EncodedField field = v.build(h, c, {.storage = Storage::r64f, .value_ranges = false});
                         double worst = 0;
@@ -139,7 +139,7 @@ void steps_and_spikes(VerifyContext& v) {
               return sound(p) ? rms_difference(p, exact) : kInf;
             };
             // half an interval at each face of a cell has the light of values between both sides: order 1
-            const bool jumps = c.filter == Filter::nearest && integrator != Integrator::exponential_midpoint;
+            const bool jumps = !interpolates(c.filter) && integrator != Integrator::exponential_midpoint;
             const double most = jumps ? 0.03 : bound;
             const double one = error(1), quarter = error(0.25), fine = error(1.0 / 128);
             return holds(fine <= most && std::isfinite(one) && std::isfinite(quarter),
@@ -169,13 +169,13 @@ void spike_in_sixteen(VerifyContext& v) {
   for (const Integrator integrator : {Integrator::preintegrated, Integrator::tolerance})
     v.for_each_filter(fmt::format("5 spike of 0.02 of the range in 16 intervals, {}: found", integrator_name(integrator)),
                       [&](const EncodingCase& c) -> Verdict {
-                        if (c.filter == Filter::nearest) return NotAsked{"its values jump over the spike"};
+                        if (!interpolates(c.filter)) return NotAsked{"its values jump over the spike"};
                         return at_most(error(c, integrator), 1e-3);
                       });
   for (const Integrator integrator : {Integrator::exponential_midpoint, Integrator::euler, Integrator::left})
     v.for_each_filter(fmt::format("5 control: spike of 0.02 of the range in 16 intervals, {}: off", integrator_name(integrator)),
                       [&](const EncodingCase& c) -> Verdict {
-                        if (c.filter == Filter::nearest) return NotAsked{"its values jump over the spike"};
+                        if (!interpolates(c.filter)) return NotAsked{"its values jump over the spike"};
                         return above(error(c, integrator), 0.1);
                       });
 }
@@ -230,7 +230,7 @@ void thin_shells(VerifyContext& v) {
           fmt::format("20 shell of {} finest cells, {}: met by every ray when step <= {}; fraction met with steps 2, 1", cells,
                       integrator_name(integrator), cells / 2),
           [&](const EncodingCase& c) -> Verdict {
-            if (c.filter == Filter::nearest) return NotAsked{kStairs};
+            if (!interpolates(c.filter)) return NotAsked{kStairs};
             const EncodedField field = v.build(h, c, {.storage = Storage::r64f});
             const double bound = fraction(field, cells, integrator, cells / 2);
             return holds(bound == 1, "1",
@@ -239,7 +239,7 @@ void thin_shells(VerifyContext& v) {
           });
     v.for_each_filter(fmt::format("20 shell of {} finest cells, preintegrated: met by every ray with step 2", cells),
                       [&](const EncodingCase& c) -> Verdict {
-                        if (c.filter == Filter::nearest) return NotAsked{kStairs};
+                        if (!interpolates(c.filter)) return NotAsked{kStairs};
                         const double met =
                             fraction(v.build(h, c, {.storage = Storage::r64f}), cells, Integrator::preintegrated, 2);
                         return holds(met == 1, "1", format_number(met));
@@ -247,7 +247,7 @@ void thin_shells(VerifyContext& v) {
   }
   v.for_each_filter(
       "20 control: shell of 1/4 finest cell, midpoints with step 2: missed by some rays", [&](const EncodingCase& c) -> Verdict {
-        if (c.filter == Filter::nearest) return NotAsked{kStairs};
+        if (!interpolates(c.filter)) return NotAsked{kStairs};
         const double met = fraction(v.build(h, c, {.storage = Storage::r64f}), 0.25, Integrator::exponential_midpoint, 2);
         return holds(met < 1, "< 1", format_number(met));
       });

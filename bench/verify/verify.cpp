@@ -14,7 +14,7 @@
 namespace amrtex::verify {
 namespace {
 
-constexpr std::array<Suite, 7> kSuites{{
+constexpr std::array<Suite, 8> kSuites{{
     {"analytic", "pictures and values with a closed form, continuity", analytic_suite},
     {"convergence", "observed orders in step, cells, pixels and isosurfaces", convergence_suite},
     {"stiff", "extinction from 0 to infinity, steps and spikes, thin shells", stiff_suite},
@@ -22,6 +22,7 @@ constexpr std::array<Suite, 7> kSuites{{
     {"geometry", "rays from anywhere in any direction; segments sum to the chord", geometry_suite},
     {"differential", "encodings against the reference, each other, GL and memory", differential_suite},
     {"metamorphic", "pictures that a change of the input must leave alone", metamorphic_suite},
+    {"reference", "the reference itself, which all others are judged by: stiff media in closed form", reference_suite},
 }};
 
 std::string parameters_text(const Json& parameters) {

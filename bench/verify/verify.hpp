@@ -151,5 +151,6 @@ void extreme_suite(VerifyContext& v);
 void geometry_suite(VerifyContext& v);
 void differential_suite(VerifyContext& v);
 void metamorphic_suite(VerifyContext& v);
+void reference_suite(VerifyContext& v);
 
 }  // namespace amrtex::verify

@@ -5,9 +5,11 @@
 namespace amrtex {
 namespace {
 
-/// Beyond this many cells a float cannot hold a position on the lattice (2^-13 of a cell);
+/// Beyond this many smallest edges a float cannot hold a position on the lattice (2^-13 of a cell);
 /// then rays are held in double and positions are rounded once more in each region.
-constexpr int kFloatRayCells = 2048;
+constexpr int kFloatRayEdges = 2048;
+/// Where a ray goes so many times as far as what it meets is thin, floats would put its ends off by 2^-18 of that.
+constexpr double kFloatDepth = 64;
 
 std::vector<double> numbers(const Vec3d& v) { return {v.x, v.y, v.z}; }
 
@@ -33,10 +35,16 @@ FinestCamera finest_camera(const DomainGeometry& geometry, const Scene& scene) {
 }
 
 bool needs_double_rays(const DomainGeometry& geometry, const Scene& scene) {
-  const Vec3i n = geometry.cells;
-  const double distance = glm::length(scene.view.eye - geometry.middle());
+  const double edge = geometry.smallest_edge();  // all below in edges: no square of a world length is asked for
+  const Vec3d size = Vec3d(geometry.cells) * (geometry.spacing / edge);
+  const double diagonal = glm::length(geometry.size() / edge);
+  const double distance = glm::length((scene.view.eye - geometry.middle()) / edge);
+  const FinestCamera camera = finest_camera(geometry, scene);
+  const Vec3d drawn = (camera.upper - camera.lower) * (geometry.spacing / edge);
+  const bool thin = distance + diagonal > kFloatDepth * std::min({drawn.x, drawn.y, drawn.z});
+  const bool wide = scene.view.orthographic && scene.view.height / edge > kFloatDepth * diagonal;
   const bool narrow = !scene.view.orthographic && scene.view.fov_y < 1;
-  return std::max({n.x, n.y, n.z}) > kFloatRayCells || distance > 16 * glm::length(geometry.size()) || narrow;
+  return std::max({size.x, size.y, size.z}) > kFloatRayEdges * (1 + 1e-6) || distance > 16 * diagonal || thin || wide || narrow;
 }
 
 void add_camera(const DomainGeometry& geometry, const Scene& scene, SceneBindings& b) {

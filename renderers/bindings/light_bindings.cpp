@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "renderers/bindings/transfer_bindings.hpp"
+#include "renderers/scene/stored_units.hpp"
 #include "renderers/scene/triangle_layer.hpp"
 #include "structures/common/build_tools.hpp"
 #include "structures/mesh/error.hpp"
@@ -30,15 +31,16 @@ int bisections(const RenderSettings& s) {
 double surface_depth(double opacity) { return opacity < 1 ? -std::log1p(-opacity) : 1e4; }
 
 /// Colours of surfaces over a second field.
-void add_surface_map(const Scene& scene, int fields, SceneBindings& b) {
+void add_surface_map(const Scene& scene, const EncodedField& field, SceneBindings& b) {
   const Isosurfaces& iso = scene.settings.isosurfaces;
   const bool mapped = !iso.color_field.empty() && iso.output == Output::color;
-  const TransferFunction map = surface_colors(scene);
+  TransferFunction map = surface_colors(scene);
+  if (mapped && field.field_count < 2)
+    throw Error(fmt::format("surfaces coloured by the field {}: the structure was built without it", quote(iso.color_field)));
+  if (mapped) map = in_units(map, field.scale_of(1).units);
   if (map.color.size() > kMostExactPoints)
     throw UsageError(fmt::format("surfaces coloured by the field {}: {} colour points; at most {} are supported",
                                  quote(iso.color_field), map.color.size(), kMostExactPoints));
-  if (mapped && fields < 2)
-    throw Error(fmt::format("surfaces coloured by the field {}: the structure was built without it", quote(iso.color_field)));
   if (mapped) b.set("u_surface_points", color_points(map));
   b.define("AMRTEX_SURFACE_POINTS", mapped ? static_cast<int>(map.color.size()) : 0);
   b.define("AMRTEX_SURFACE_LOGARITHMIC", mapped && map.logarithmic ? 1 : 0);
@@ -62,7 +64,7 @@ HostTexture triangle_buffer(const TriangleLayer& layer, double unit) {
 
 }  // namespace
 
-void add_surfaces(const Scene& scene, int fields, SceneBindings& b) {
+void add_surfaces(const Scene& scene, const Scene& stored, const EncodedField& field, SceneBindings& b) {
   if (!scene.settings.draws_surfaces()) return;
   const Isosurfaces& iso = scene.settings.isosurfaces;
   std::vector<double> light;
@@ -70,13 +72,13 @@ void add_surfaces(const Scene& scene, int fields, SceneBindings& b) {
     const Vec3d rgb = surface_color(scene, iso.values[i]);
     light.insert(light.end(), {rgb.r, rgb.g, rgb.b, surface_depth(iso.opacity.empty() ? 1 : iso.opacity[i])});
   }
-  b.set("u_isovalues", iso.values);
+  b.set("u_isovalues", stored.settings.isosurfaces.values);
   b.set("u_surface_light", light);
   b.set("u_surface_ambient", surface_light(0));
   // no less than the quantum of positions can tell
   b.set("u_face_distance", std::clamp(2 * iso.tolerance, 1.0 / 1024, 0.5));
   b.set("u_bisections", bisections(scene.settings));
-  add_surface_map(scene, fields, b);
+  add_surface_map(scene, field, b);
   b.define("AMRTEX_OUTPUT", static_cast<int>(iso.output));
   b.define("AMRTEX_SHADING", static_cast<int>(iso.shading));
 }

@@ -3,12 +3,13 @@
 
 #include "renderers/bindings/shader_inputs.hpp"
 #include "renderers/scene/scene.hpp"
+#include "structures/common/encoding.hpp"
 #include "structures/mesh/domain_geometry.hpp"
 
 namespace amrtex {
 
-/// Isosurfaces (shaders/isosurface.glsl); nothing where the mode draws none. `fields`: that the structure holds.
-void add_surfaces(const Scene& scene, int fields, SceneBindings& bindings);
+/// Isosurfaces (shaders/isosurface.glsl); nothing where the mode draws none. `stored`: the scene in the field's units.
+void add_surfaces(const Scene& scene, const Scene& stored, const EncodedField& field, SceneBindings& bindings);
 /// Light that reaches surfaces from around them.
 void add_occlusion(const DomainGeometry& geometry, const RenderSettings& settings, SceneBindings& bindings);
 /// A lamp and its shadows (shaders/shadow.glsl).

@@ -8,22 +8,21 @@
 
 #include "renderers/bindings/finest_camera.hpp"
 #include "renderers/bindings/light_bindings.hpp"
+#include "renderers/bindings/picture_units.hpp"
 #include "renderers/bindings/scene_needs.hpp"
 #include "renderers/bindings/transfer_bindings.hpp"
 #include "renderers/scene/scene_settings.hpp"
+#include "renderers/scene/stored_units.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {
 namespace {
 
-/// Longest interval that `tolerance` tries, in cell widths of the region.
-constexpr double kLongestInterval = 8;
 /// Part of the tolerance that a ray may leave behind it.
 constexpr double kToleranceLeft = 0.1;
-
-/// Error that one interval may have: a smaller tolerance needs more of them, so each gets a smaller part. Errors of
-/// intervals cancel in part, and corrected ones are smaller than estimated; the factor is measured (experiments/tolerance).
-double interval_error(double tolerance) { return 1.2 * std::pow(tolerance, 1.25); }
+/// What the bounds of a pixel's intervals may come to, in tolerances. Errors are smaller than their bounds and cancel in part;
+/// the factor is measured (tests/tolerance_test.cpp), and no pixel is off by more than it and kToleranceLeft.
+constexpr double kSumOfBounds = 2;
 
 /// Cells of one level that may lie in a row in a region: along the diagonal of its largest patch, or of the largest page.
 double longest_run(const DomainGeometry& geometry) {
@@ -48,14 +47,24 @@ void check_sampling(const DomainGeometry& geometry, const Scene& scene) {
                                        step, cells / step, sampling_name(scene.settings.sampling), most));
 }
 
+/// Throws UnsupportedError for a curve over log10 of values that no float holds.
+void require_log_axes(const EncodedField& field, const Scene& scene) {
+  if (scene.settings.draws_volume())
+    require_log_axis(scene.transfer_function, field.scale.units, field.values.front().least_magnitude);
+  for (std::size_t i = 0; i < scene.more_fields.size(); ++i) {
+    const auto number = static_cast<int>(i) + 1;
+    require_log_axis(scene.more_fields[i].transfer_function, field.scale_of(number).units, field.values[i + 1].least_magnitude);
+  }
+}
+
 /// What the shader draws: pictures of depth and normals have no volume.
 Mode shader_mode(const RenderSettings& s) { return s.mode == Mode::dvr_iso && !s.draws_volume() ? Mode::iso : s.mode; }
 
-/// a, b of each field.
+/// a, b of each field, to numbers in its units.
 std::vector<double> value_scales(const EncodedField& field) {
   std::vector<double> scales;
   for (int i = 0; i < field.field_count; ++i) {
-    const StorageScale s = field.scale_of(i);
+    const StorageScale s = field.scale_of(i).in_units();
     scales.insert(scales.end(), {s.offset, s.scale});
   }
   return scales;
@@ -67,8 +76,8 @@ void add_march(const DomainGeometry& geometry, const Scene& scene, SceneBindings
   const double least = by_tolerance ? kToleranceLeft * s.tolerance : 0;
   b.set("u_step", s.step);
   b.set("u_early_end", std::max(1 - s.early_end.value_or(1), least));
-  b.set("u_length_unit", geometry.smallest_edge());
-  b.define("AMRTEX_RAY_DOUBLE", needs_double_rays(geometry, scene) ? 1 : 0);
+  // lengths that are multiplied by an offset need all their digits
+  b.define("AMRTEX_RAY_DOUBLE", needs_double_rays(geometry, scene) || b.picture.length > 0 ? 1 : 0);
   b.define("AMRTEX_MODE", static_cast<int>(shader_mode(s)));
   b.define("AMRTEX_LATTICE", s.sampling == Sampling::lattice ? 1 : 0);
   b.define("AMRTEX_SKIP", s.skip ? 1 : 0);
@@ -91,8 +100,7 @@ void add_integrator(const DomainGeometry& geometry, const Scene& scene, const Fi
                     filter_name(definition.filter), fmt::join(accepted, ", ")));
   }
   b.define("AMRTEX_CONTINUOUS", filter_info(definition.filter).continuity == Continuity::everywhere ? 1 : 0);
-  b.set("u_interval_error", interval_error(s.tolerance));
-  b.set("u_longest", kLongestInterval);
+  b.set("u_error_bound", kSumOfBounds * s.tolerance);
 }
 
 }  // namespace
@@ -137,23 +145,27 @@ const char* raycast_entry(const Scene& scene) {
 SceneBindings bind_scene(const DomainGeometry& geometry, const EncodedField& field, const Scene& scene) {
   const RenderSettings& s = scene.settings;
   validate(scene);
+  require_resolved(geometry, scene);
   check_sampling(geometry, scene);
   require_needs(field, scene);
+  require_log_axes(field, scene);
+  const Scene stored = in_units(scene, [&](int number) { return field.scale_of(number).units; });
   SceneBindings b;
   b.uniforms = field_uniforms(geometry, field);
   add_camera(geometry, scene, b);
   if (s.prunes_levels()) add_detail(geometry, scene, b);
+  add_picture_units(geometry, field, scene, b);
   add_march(geometry, scene, b);
-  add_transfer_function(geometry, scene, b);
+  add_transfer_function(geometry, stored, b);
   add_clip_planes(geometry, s, b);
   add_ray_offset(s, b);
   add_mirror(s, b);
   add_occlusion(geometry, s, b);
   add_light(geometry, s, b);
-  add_more_transfer_functions(geometry, scene, b);
+  add_more_transfer_functions(geometry, stored, b);
   add_triangles(geometry, scene, b);
-  add_surfaces(scene, field.field_count, b);
-  add_integrator(geometry, scene, field.definition, b);
+  add_surfaces(scene, stored, field, b);
+  add_integrator(geometry, stored, field.definition, b);
   return b;
 }
 

@@ -11,12 +11,21 @@
 
 namespace amrtex {
 
+/// What a shader's picture stands for: offset + scale * its value; of line integrals with an offset, scale * its value + offset *
+/// length * (the sum of the two channels behind).
+struct PictureUnits {
+  double scale = 1;   ///< a power of two
+  double offset = 0;  ///< of the field's values
+  double length = 0;  ///< world length of a unit of ray length; 0 where no lengths are drawn
+};
+
 struct SceneBindings {
   std::vector<std::pair<std::string, int>> defines;
   UniformValues uniforms;
   std::vector<HostTexture> buffers;  ///< the transfer function's tables, where it has too many points; triangles
-  bool transfer_exact = true;        ///< evaluated from its points; else from a table of 4096 bins
-  double triangle_seconds = 0;       ///< that finding where rays meet triangles took
+  PictureUnits picture;
+  bool transfer_exact = true;   ///< evaluated from its points; else from a table of 4096 bins
+  double triangle_seconds = 0;  ///< that finding where rays meet triangles took
 
   void define(std::string name, int value) { defines.emplace_back(std::move(name), value); }
   void set(std::string name, double value) { uniforms.push_back({std::move(name), std::vector<double>{value}}); }

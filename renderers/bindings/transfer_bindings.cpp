@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "structures/common/build_tools.hpp"
 
@@ -20,6 +21,12 @@ constexpr double kMostExtinction = 1e30;
 /// Is the transfer function evaluated from its points, or from a table?
 bool is_exact(const TransferFunction& tf) { return std::max(tf.extinction.size(), tf.color.size()) <= kMostExactPoints; }
 
+/// A float, or the largest one.
+double as_float(double v) {
+  constexpr double kMost = 3e38;
+  return std::clamp(v, -kMost, kMost);
+}
+
 /// `unit`: multiplies extinction so that it is per unit of ray length. `suffix`: of the uniforms' names.
 void add_points(const TransferFunction& tf, double unit, SceneBindings& b, const std::string& suffix = "") {
   std::vector<double> extinction;
@@ -28,8 +35,8 @@ void add_points(const TransferFunction& tf, double unit, SceneBindings& b, const
     const double kappa = std::min(tf.extinction[i].extinction * unit, kMostExtinction);
     double slope = 0;
     if (i + 1 < tf.extinction.size())
-      slope =
-          (std::min(tf.extinction[i + 1].extinction * unit, kMostExtinction) - kappa) / (tf.axis(tf.extinction[i + 1].value) - x);
+      slope = as_float((std::min(tf.extinction[i + 1].extinction * unit, kMostExtinction) - kappa) /
+                       (tf.axis(tf.extinction[i + 1].value) - x));
     extinction.insert(extinction.end(), {x, kappa, slope});
   }
   b.set("u_extinction_points" + suffix, extinction);
@@ -70,7 +77,7 @@ std::vector<double> knots(const TransferFunction& tf, double unit) {
   add(-kFar, 0, values.front());
   for (std::size_t i = 0; i < values.size(); ++i) {
     const double x = tf.axis(values[i]);
-    add(x, i + 1 < values.size() ? 1 / (tf.axis(values[i + 1]) - x) : 0, values[i]);
+    add(x, i + 1 < values.size() ? as_float(1 / (tf.axis(values[i + 1]) - x)) : 0, values[i]);
   }
   add(kFar, 0, values.back());
   return numbers;
@@ -78,7 +85,7 @@ std::vector<double> knots(const TransferFunction& tf, double unit) {
 
 /// A little inside of the true ones, by what the shader's own evaluation may be off (`margin`, on the axis).
 std::vector<std::array<double, 2>> invisible_ranges(const TransferFunction& tf, double margin) {
-  constexpr double kFar = 3e38;
+  constexpr double kFar = std::numeric_limits<double>::max();
   const auto value = [&](double x) { return tf.logarithmic ? std::pow(10.0, x) : x; };
   std::vector<std::array<double, 2>> ranges;
   const auto& points = tf.extinction;
@@ -114,7 +121,7 @@ std::vector<double> color_points(const TransferFunction& tf) {
   for (std::size_t i = 1; i < tf.color.size(); ++i) {
     const double x = tf.axis(tf.color[i].value);
     const Vec3d step = tf.color[i].rgb - tf.color[i - 1].rgb;
-    color.insert(color.end(), {x, 1 / (x - tf.axis(tf.color[i - 1].value)), step.x, step.y, step.z});
+    color.insert(color.end(), {x, as_float(1 / (x - tf.axis(tf.color[i - 1].value))), step.x, step.y, step.z});
   }
   return color;
 }
@@ -134,7 +141,7 @@ void add_transfer_function(const DomainGeometry& geometry, const Scene& scene, S
       add_points(tf, per_unit, b);
     else
       add_table(tf, per_unit, b);
-    for (const auto& range : invisible_ranges(tf)) invisible.insert(invisible.end(), range.begin(), range.end());
+    for (const auto& [from, to] : invisible_ranges(tf)) invisible.insert(invisible.end(), {as_float(from), as_float(to)});
     if (!invisible.empty()) b.set("u_invisible_ranges", invisible);
   } else {
     b.set("u_extinction_points", std::vector<double>(3));
@@ -159,7 +166,7 @@ void add_more_transfer_functions(const DomainGeometry& geometry, const Scene& sc
     b.define("AMRTEX_COLOR_POINTS" + suffix, static_cast<int>(tf.color.size()));
     b.define("AMRTEX_LOGARITHMIC" + suffix, tf.logarithmic ? 1 : 0);
     for (const auto& [from, to] : invisible_ranges(tf))
-      invisible.insert(invisible.end(), {static_cast<double>(number), from, to});
+      invisible.insert(invisible.end(), {static_cast<double>(number), as_float(from), as_float(to)});
   }
   b.define("AMRTEX_MORE_INVISIBLE_RANGES", static_cast<int>(invisible.size() / 3));
   if (!invisible.empty()) b.set("u_more_invisible_ranges", invisible);

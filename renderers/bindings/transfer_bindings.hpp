@@ -11,6 +11,8 @@
 
 namespace amrtex {
 
+// Curves are those of a scene in stored units (renderers/scene/stored_units.hpp), or over values where only these are asked for.
+
 /// Intervals of values without extinction, first and last value of each.
 std::vector<std::array<double, 2>> invisible_ranges(const TransferFunction& transfer_function);
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "renderers/bindings/picture_units.hpp"
 #include "renderers/scene/scene_settings.hpp"
 #include "structures/mesh/error.hpp"
 
@@ -281,11 +282,12 @@ FrameTime BoxConsumer::draw() {
 }
 
 Picture BoxConsumer::read() const {
-  Picture picture = target_.read_picture(scene_.settings.picture_channels());
-  if (scene_.settings.mode == Mode::mip)
+  const PictureUnits& units = resources_.picture_units();
+  Picture picture = target_.read_picture(drawn_channels(units, scene_.settings.picture_channels()));
+  if (scene_.settings.mode == Mode::mip && units.offset == 0)
     for (double& v : picture.values)
       if (v <= kNoMaximum) v = 0;
-  return picture;
+  return in_picture_units(std::move(picture), units);
 }
 
 WorkCounts BoxConsumer::count() {

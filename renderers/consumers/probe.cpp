@@ -17,7 +17,7 @@ GlBuffer upload(Context& context, const std::vector<T>& values) {
 std::vector<ProbeResult> probe_on_gl(Context& context, const DomainGeometry& geometry, const Structure& structure,
                                      std::span<const FinestPosition> points, int number) {
   const EncodedField& field = structure.field;
-  field.scale_of(number);  // refuses a number that the shader could not index
+  const ValueUnits units = field.scale_of(number).units;  // refuses a number that the shader could not index
   if (points.empty()) return {};
   std::vector<glm::ivec4> cells;
   std::vector<glm::vec4> fractions;
@@ -43,7 +43,7 @@ std::vector<ProbeResult> probe_on_gl(Context& context, const DomainGeometry& geo
                                      values.data());
   context.check("probing the field");
   std::vector<ProbeResult> results;
-  for (const glm::vec4& v : values) results.push_back({v.y > 0.5F, static_cast<double>(v.x), static_cast<int>(v.z)});
+  for (const glm::vec4& v : values) results.push_back({v.y > 0.5F, units.value(static_cast<double>(v.x)), static_cast<int>(v.z)});
   return results;
 }
 
@@ -52,10 +52,13 @@ std::vector<ProbeResult> probe_on_cpu(const DomainGeometry& geometry, const Enco
   const auto cpu = make_cpu_field(field.encoding, precision);
   std::vector<const HostTexture*> textures;
   for (const HostTexture& t : field.textures) textures.push_back(&t);
-  field.scale_of(number);  // refuses a number that the text could not index
+  const ValueUnits units = field.scale_of(number).units;  // refuses a number that the text could not index
   cpu->set(probe_key(field, number), field_uniforms(geometry, field), textures);
   std::vector<ProbeResult> results;
-  for (const FinestPosition& p : points) results.push_back(cpu->sample(p.cell, p.fraction, number));
+  for (const FinestPosition& p : points) {
+    results.push_back(cpu->sample(p.cell, p.fraction, number));
+    results.back().value = units.value(results.back().value);
+  }
   return results;
 }
 

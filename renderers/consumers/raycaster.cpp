@@ -2,6 +2,8 @@
 
 #include <chrono>
 
+#include "renderers/bindings/picture_units.hpp"
+
 namespace amrtex {
 
 Raycaster::Raycaster(Context& context, const DomainGeometry& geometry, const Structure& structure, const Scene& scene)
@@ -33,7 +35,10 @@ FrameTime Raycaster::draw() {
   return {wall.count(), timer_.milliseconds()};
 }
 
-Picture Raycaster::read() const { return target_.read_picture(scene_.settings.picture_channels()); }
+Picture Raycaster::read() const {
+  const PictureUnits& units = resources_.picture_units();
+  return in_picture_units(target_.read_picture(drawn_channels(units, scene_.settings.picture_channels())), units);
+}
 
 WorkCounts Raycaster::count() {
   Program counting = make_program(true);

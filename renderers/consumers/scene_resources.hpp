@@ -21,6 +21,7 @@ class SceneResources {
   void bind(Program& program, const GpuField& gpu) const;
   /// Storage buffers of field and scene.
   int buffer_count() const;
+  const PictureUnits& picture_units() const { return bindings_.picture; }
   bool transfer_exact() const { return bindings_.transfer_exact; }
   double triangle_seconds() const { return bindings_.triangle_seconds; }
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdlib>
 #include <limits>
 #include <utility>
@@ -111,8 +112,27 @@ std::int64_t max_resident_handles(std::string_view renderer) {
   return renderer.starts_with("zink") ? 1023 : std::numeric_limits<std::int64_t>::max();
 }
 
+bool takes_texture(const GladGLContext& gl, int width, int height, int depth) {
+  gl.TexStorage3D(GL_PROXY_TEXTURE_3D, 1, GL_R32F, width, height, depth);
+  GLint taken = 0;
+  gl.GetTexLevelParameteriv(GL_PROXY_TEXTURE_3D, 0, GL_TEXTURE_WIDTH, &taken);
+  return taken != 0;
+}
+
+/// GL has no query for it either, but drivers tell of a size whether they would take it: textures of four bytes a texel and of
+/// growing depth are asked about. No limit where even the longest axes are taken.
+std::int64_t max_texture_bytes(const GladGLContext& gl, int longest_axis) {
+  if (takes_texture(gl, longest_axis, longest_axis, longest_axis)) return std::numeric_limits<std::int64_t>::max();
+  const int edge = std::min(longest_axis, 1024);
+  int taken = 0;
+  for (int step = std::bit_floor(static_cast<unsigned>(longest_axis)); step > 0; step /= 2)
+    if (taken + step <= longest_axis && takes_texture(gl, edge, edge, taken + step)) taken += step;
+  return taken == longest_axis ? std::numeric_limits<std::int64_t>::max() : std::int64_t{4} * edge * edge * taken;
+}
+
 void read_limits(const GladGLContext& gl, GlContextInfo& info) {
   info.max_3d_texture_size = get_int(gl, GL_MAX_3D_TEXTURE_SIZE);
+  info.max_texture_bytes = max_texture_bytes(gl, info.max_3d_texture_size);
   info.max_buffer_bytes = get_int64(gl, GL_MAX_SHADER_STORAGE_BLOCK_SIZE);
   info.max_texture_units = get_int(gl, GL_MAX_TEXTURE_IMAGE_UNITS);
   info.max_storage_bindings = get_int(gl, GL_MAX_FRAGMENT_SHADER_STORAGE_BLOCKS);

@@ -133,6 +133,7 @@ Json to_json(const GlContextInfo& info) {
           {"handles_may_differ", info.handles_may_differ},
           {"max_resident_handles", info.has_handle_limit() ? Json(info.max_resident_handles) : Json(nullptr)},
           {"max_3d_texture_size", info.max_3d_texture_size},
+          {"max_texture_bytes", info.has_texture_limit() ? Json(info.max_texture_bytes) : Json(nullptr)},
           {"max_buffer_bytes", info.max_buffer_bytes},
           {"max_texture_units", info.max_texture_units},
           {"max_storage_bindings", info.max_storage_bindings},
@@ -160,6 +161,7 @@ GlContextInfo context_info_from_json(const Json& json) {
   read("handles_may_differ", info.handles_may_differ);
   if (!json.at("max_resident_handles").is_null()) read("max_resident_handles", info.max_resident_handles);
   read("max_3d_texture_size", info.max_3d_texture_size);
+  if (!json.at("max_texture_bytes").is_null()) read("max_texture_bytes", info.max_texture_bytes);
   read("max_buffer_bytes", info.max_buffer_bytes);
   read("max_texture_units", info.max_texture_units);
   read("max_storage_bindings", info.max_storage_bindings);

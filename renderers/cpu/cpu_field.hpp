@@ -14,7 +14,7 @@ namespace amrtex {
 
 struct ProbeResult {
   bool found = false;  ///< is there a value?
-  double value = 0;
+  double value = 0;    ///< in field units; of CpuField::sample a number in the units that shaders compute in
   int level = -1;
 };
 

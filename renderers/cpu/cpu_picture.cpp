@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "renderers/bindings/picture_units.hpp"
 #include "renderers/bindings/scene_bindings.hpp"
 
 namespace amrtex {
@@ -20,14 +21,14 @@ Picture trace_on_cpu(CpuField& cpu, const DomainGeometry& geometry, const Encode
   for (const HostTexture& t : bindings.buffers) textures.push_back(&t);
   cpu.set(scene_key(raycast_entry(scene), field, bindings, false), bindings.uniforms, textures);
   const RenderSettings& s = scene.settings;
-  Picture picture(s.width, s.height, s.picture_channels());
+  Picture picture(s.width, s.height, drawn_channels(bindings.picture, s.picture_channels()));
   tbb::parallel_for(0, s.height, [&](int y) {
     for (int x = 0; x < s.width; ++x) {
       const auto value = cpu.trace(x + 0.5, s.height - y - 0.5);
       std::copy_n(value.begin(), picture.channels, picture.pixel(x, y));
     }
   });
-  return picture;
+  return in_picture_units(std::move(picture), bindings.picture);
 }
 
 }  // namespace amrtex

@@ -16,8 +16,8 @@ namespace amrtex {
 /// Value of field number `number` of a structure at a place; nullopt where there is none. Called from several threads.
 using FieldValues = std::function<std::optional<double>(const FinestPosition& p, int number)>;
 
-/// The march in double precision over the regions of one encoding. `values` must outlive it. Gradients of
-/// surfaces are differences of `values`, whatever the encoding stores.
+/// The march in double precision over the regions of one encoding. `values`, numbers in the fields' units, must outlive it.
+/// Gradients of surfaces are differences of `values`, whatever the encoding stores.
 std::unique_ptr<CpuField> make_sampler(std::string_view encoding, const FieldValues& values);
 
 /// The scene drawn from `values` where `field` would be sampled, on all cores. No region is skipped, so

@@ -91,12 +91,12 @@ bool RayFront::advance(double exit) {
   return up ? position_[exit_axis_] < domain_[exit_axis_] : position_[exit_axis_] > 0;
 }
 
-Cubic RayFront::along(const Trilinear& f, const Vec3d& lower, double width, double from, double to) const {
+Cubic RayFront::rise_along(const Trilinear& f, const Vec3d& lower, double width, double from, double to) const {
   const Vec3d q = (ray_.origin + from * ray_.direction - lower) / width;
   const Vec3d d = (to - from) / width * ray_.direction;
   const auto& a = f.coefficients;
   // f = A + B y + C z + D yz, each of the four linear in s through x = q.x + s d.x
-  const double a0 = a[0] + a[1] * q.x, a1 = a[1] * d.x;
+  const double a0 = a[1] * q.x, a1 = a[1] * d.x;
   const double b0 = a[2] + a[3] * q.x, b1 = a[3] * d.x;
   const double c0 = a[4] + a[5] * q.x, c1 = a[5] * d.x;
   const double d0 = a[6] + a[7] * q.x, d1 = a[7] * d.x;

@@ -2,7 +2,7 @@
 // reference.
 #pragma once
 
-#include "renderers/reference/ray_integral.hpp"
+#include "renderers/reference/piece_function.hpp"
 #include "renderers/reference/reference_field.hpp"
 
 namespace amrtex {
@@ -47,8 +47,8 @@ class RayFront {
   /// back, so each call passes at least one plane and rounding cannot trap the ray.
   bool advance(double exit);
 
-  /// A trilinear function is a cubic along a line. Its unit cube: finest space.
-  Cubic along(const Trilinear& f, const Vec3d& lower, double width, double from, double to) const;
+  /// A trilinear function, less its value at the lower corner, is a cubic along a line. Its unit cube: finest space.
+  Cubic rise_along(const Trilinear& f, const Vec3d& lower, double width, double from, double to) const;
 
  private:
   const ReferenceField* field_;

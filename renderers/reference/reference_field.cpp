@@ -15,7 +15,8 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
 
-ReferenceField::ReferenceField(const AmrHierarchy& hierarchy, int field) : hierarchy_(hierarchy) {
+ReferenceField::ReferenceField(const AmrHierarchy& hierarchy, int field)
+    : hierarchy_(hierarchy), units_(value_units(hierarchy.statistics(field))) {
   const int n = hierarchy.level_count();
   levels_.resize(static_cast<std::size_t>(n));
   std::atomic<bool> missing = hierarchy.has_holes();
@@ -27,7 +28,11 @@ ReferenceField::ReferenceField(const AmrHierarchy& hierarchy, int field) : hiera
     tbb::parallel_for(std::size_t{0}, patches.size(), [&](std::size_t k) {
       const auto& values = patches[k].values[static_cast<std::size_t>(field)];
       PatchView& view = level.patches[k];
-      view = {patches[k].box, values.data(), hierarchy.leaf_mask(l, static_cast<int>(k)).data(), {}, {}};
+      view = {patches[k].box, values.data(), hierarchy.leaf_mask(l, static_cast<int>(k)).data(), {}, {}, {}};
+      if (!units_.plain()) {
+        for (const double v : values) view.numbers.push_back(units_.number(v));
+        view.values = view.numbers.data();
+      }
       for (std::size_t i = 0; i < values.size(); ++i)
         if (view.leaf[i] != 0 && !std::isfinite(values[i])) missing = true;
       restrict_patch(l, view);

@@ -9,6 +9,7 @@
 
 #include "renderers/reference/trilinear.hpp"
 #include "structures/mesh/amr_hierarchy.hpp"
+#include "structures/mesh/value_units.hpp"
 
 namespace amrtex {
 
@@ -31,12 +32,14 @@ struct ReferenceLeaf {
   double value = 0;  ///< NaN where the leaf has none
 };
 
-/// Immutable; safe to use from several threads.
+/// Values are numbers in the field's units, in double: then no square of one passes a double's range, and none loses digits to
+/// an offset. Immutable; safe to use from several threads.
 class ReferenceField {
  public:
   ReferenceField(const AmrHierarchy& hierarchy, int field);
 
   const AmrHierarchy& hierarchy() const { return hierarchy_; }
+  const ValueUnits& units() const { return units_; }
   bool has_missing() const { return has_missing_; }
   int width(int level) const { return levels_[static_cast<std::size_t>(level)].width; }
 
@@ -73,10 +76,11 @@ class ReferenceField {
   };
   struct PatchView {
     Box box;
-    const double* values;  // of the file
+    const double* values;  // the file's, or `numbers`
     const std::uint8_t* leaf;
-    std::vector<double> means;   // v_L, where the patch has refined cells; else empty
-    std::vector<double> shares;  // where they are not all 1; else empty
+    std::vector<double> numbers;  // where the units are not plain; else empty
+    std::vector<double> means;    // v_L, where the patch has refined cells; else empty
+    std::vector<double> shares;   // where they are not all 1; else empty
   };
   struct Level {
     int width;
@@ -94,6 +98,7 @@ class ReferenceField {
   double neighbour_mean(int level, const Vec3i& cell, int distance) const;
 
   const AmrHierarchy& hierarchy_;
+  ValueUnits units_;
   std::vector<Level> levels_;
   bool has_missing_ = false;
 };

@@ -15,16 +15,16 @@ class FieldsLight {
   explicit FieldsLight(std::vector<const TransferTable*> tables) : tables_(std::move(tables)), pieces_(tables_.size()) {}
 
   /// A piece of a field between two places of the ray (world length), behind those before.
-  void add(std::size_t field, const PieceFunction& f, double from, double to) { pieces_[field].push_back({f, from, to}); }
+  void add(std::size_t field, const PieceFunction& f, double from, double to) { pieces_[field].push_back({f, {from, to}}); }
 
-  /// Adds what was gathered, in parts of at most `max_part` (world), until nothing behind is seen, and forgets it.
-  void drain(LightIntegral& light, double max_part);
+  /// Adds what was gathered until nothing behind is seen, and forgets it.
+  void drain(LightIntegral& light);
 
  private:
   struct Piece {
     PieceFunction f;
-    double from, to;
-    double at(double t) const { return (t - from) / (to - from); }
+    RaySpan span;
+    double at(double t) const { return (t - span.from) / span.length(); }
   };
   /// A field that can be seen in a part of a stretch.
   struct Emitter {
@@ -32,9 +32,10 @@ class FieldsLight {
     const TransferTable* table;
     const TransferTable::Segment* segment;
   };
+  class SumStretch;
   using Pieces = std::vector<const Piece*>;  // of one stretch, one a field; null where it has no value
 
-  void add_stretch(LightIntegral& light, const Pieces& pieces, double from, double to, double max_part);
+  void add_stretch(LightIntegral& light, const Pieces& pieces, double from, double to);
 
   std::vector<const TransferTable*> tables_;
   std::vector<std::vector<Piece>> pieces_;

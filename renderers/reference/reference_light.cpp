@@ -7,6 +7,9 @@
 namespace amrtex {
 namespace {
 
+// of a ray's tolerance: what a lamp's light is off by must not look like a change of that light along the ray
+constexpr double kLampShare = 1.0 / 32;
+
 TransferFunction of_one_color(TransferFunction tf) {
   tf.color = {{tf.extinction.front().value, Vec3d(1)}};
   return tf;
@@ -15,15 +18,16 @@ TransferFunction of_one_color(TransferFunction tf) {
 }  // namespace
 
 LampScene::LampScene(const Scene& scene, const FilterReference& f, double extinction_scale, const Vec3d& draw_lower,
-                     const Vec3d& draw_upper, double largest_part)
+                     const Vec3d& draw_upper, const RayRule& ray_rule)
     : filter(f),
       table(of_one_color(scene.transfer_function), extinction_scale),
       lower(draw_lower),
       upper(draw_upper),
-      part(largest_part),
+      rule(ray_rule),
       ambient(scene.settings.point_light->ambient) {
   const AmrHierarchy& h = f.hierarchy();
   cells_a_length = Vec3d(h.cells(h.finest_level())) / (h.domain_upper() - h.domain_lower());
+  rule.tolerance *= kLampShare;
   for (const ClipPlane& plane : scene.settings.clip_planes) planes.push_back(in_finest_cells(h, plane));
   position = (scene.settings.point_light->position - h.domain_lower()) * cells_a_length;
 }
@@ -41,11 +45,13 @@ double LampTracer::light_at(const Vec3d& p) {
     end = std::min(end, (face - p[a]) / ray.direction[a]);
   }
   end = cut(ray, scene_.planes, {0, end}).to;  // it begins where something is drawn, whatever rounding says
-  LightIntegral shade(scene_.table);
+  LightIntegral shade({scene_.rule.part, scene_.rule.tolerance, end}, &scene_.table);
   tracer_.trace(ray, end, [&](const PieceFunction& f, double from, double to) {
-    shade.add(f, to - from, scene_.part);
-    return shade.transmittance() >= LightIntegral::kOpaque;
+    shade.add(f, {from, to});
+    return !shade.opaque();
   });
+  error_ = std::max(error_, (1 - scene_.ambient) * shade.error());
+  evaluations_ += shade.evaluations();
   return scene_.ambient + (1 - scene_.ambient) * shade.transmittance();
 }
 

@@ -84,19 +84,20 @@ void SurfaceFinder::cross(const PieceFunction& f, double length, std::size_t sur
   }
 }
 
-SurfaceScene::SurfaceScene(const Scene& s, const FilterReference& f, const FilterReference* color, const TransferTable* table,
-                           double largest_part)
-    : scene(s), settings(s.settings.isosurfaces), filter(f), color_filter(color), volume(table), part(largest_part) {
-  for (const double value : settings.values) rgb.push_back(surface_color(scene, value));
+SurfaceScene::SurfaceScene(const Scene& s, const Scene& stored, const FilterReference& f, const FilterReference* color,
+                           const TransferTable* table, const RayRule& ray_rule)
+    : scene(s), settings(stored.settings.isosurfaces), filter(f), color_filter(color), volume(table), rule(ray_rule) {
+  for (const double value : scene.settings.isosurfaces.values) rgb.push_back(surface_color(scene, value));
 }
 
-void SurfacePainter::draw(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const std::optional<Mirror>& mirror,
-                          double start, const LightIntegral::Arriving& lamp, double* pixel) {
+SurfacePainter::Cost SurfacePainter::draw(ReferenceTracer& tracer, const std::vector<RayPart>& parts,
+                                          const std::optional<Mirror>& mirror, double start, const LightIntegral::Arriving& lamp,
+                                          double* pixel) {
   if (scene_.settings.output == Output::color) return draw_color(tracer, parts, lamp, pixel);
   SurfaceFinder finder(scene_.settings.values, kJoint * (parts.back().start + parts.back().length));
   bool found = false;
   for (const RayPart& part : parts) {
-    if (found) return;
+    if (found) break;
     tracer.trace(part.ray, part.length, [&](const PieceFunction& f, double from, double to) {
       const auto& crossings = finder.next(f, part.start + from, part.start + to);
       found = !crossings.empty();
@@ -114,32 +115,35 @@ void SurfacePainter::draw(ReferenceTracer& tracer, const std::vector<RayPart>& p
       return false;
     });
   }
+  return {};
 }
 
-void SurfacePainter::draw_color(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const LightIntegral::Arriving& lamp,
-                                double* pixel) {
+SurfacePainter::Cost SurfacePainter::draw_color(ReferenceTracer& tracer, const std::vector<RayPart>& parts,
+                                                const LightIntegral::Arriving& lamp, double* pixel) {
   const Isosurfaces& surfaces = scene_.settings;
-  LightIntegral light = scene_.volume != nullptr ? LightIntegral(*scene_.volume, lamp) : LightIntegral();
-  SurfaceFinder finder(surfaces.values, kJoint * (parts.back().start + parts.back().length));
+  const double way = parts.back().start + parts.back().length;
+  LightIntegral light({scene_.rule.part, scene_.rule.tolerance, way}, scene_.volume, lamp);
+  SurfaceFinder finder(surfaces.values, kJoint * way);
   for (const RayPart& part : parts) {
-    if (light.transmittance() < LightIntegral::kOpaque) break;
+    if (light.opaque()) break;
     tracer.trace(part.ray, part.length, [&](const PieceFunction& f, double from, double to) {
       double behind = 0;  // the last crossing
       for (const Crossing& c : finder.next(f, part.start + from, part.start + to)) {
-        light.add(f, to - from, scene_.part, behind, c.s, from);
+        light.add(f, {from, to}, behind, c.s);
         behind = c.s;
-        if (light.transmittance() < LightIntegral::kOpaque) return false;
+        if (light.opaque()) return false;
         const double t = from + c.s * (to - from);
         const Vec3d p = point_of(tracer, part.ray, t, c.s);
         const Vec3d rgb = color_at(p, c.surface, part.direction) * (lamp ? lamp(t) : 1.0);
         light.add_surface(rgb, surfaces.opacity.empty() ? 1 : surfaces.opacity[c.surface]);
       }
-      light.add(f, to - from, scene_.part, behind, 1, from);
-      return light.transmittance() >= LightIntegral::kOpaque;
+      light.add(f, {from, to}, behind);
+      return !light.opaque();
     });
   }
   for (int c = 0; c < 3; ++c) pixel[c] = light.color()[c];
   pixel[3] = 1 - light.transmittance();
+  return {light.error(), light.evaluations()};
 }
 
 /// What the surface sends to the eye.
@@ -148,7 +152,7 @@ Vec3d SurfacePainter::color_at(const Vec3d& p, std::size_t surface, const Vec3d&
   if (color_point_) {
     const auto position = position_at(scene_.color_filter->hierarchy(), p);
     const auto value = position ? color_point_->value(*position) : std::nullopt;
-    if (value) rgb = surface_color(scene_.scene, *value);
+    if (value) rgb = surface_color(scene_.scene, scene_.color_filter->field().units().value(*value));
   }
   if (scene_.settings.shading == Shading::none && !around_) return rgb;
   const Vec3d normal = normal_at(p);

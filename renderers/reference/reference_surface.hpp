@@ -44,15 +44,16 @@ class SurfaceFinder {
 
 /// What the rays of one picture share.
 struct SurfaceScene {
-  SurfaceScene(const Scene& scene, const FilterReference& filter, const FilterReference* color_filter,
-               const TransferTable* volume, double part);
+  /// `stored`: the scene in the field's units.
+  SurfaceScene(const Scene& scene, const Scene& stored, const FilterReference& filter, const FilterReference* color_filter,
+               const TransferTable* volume, const RayRule& rule);
 
   const Scene& scene;
-  const Isosurfaces& settings;
+  const Isosurfaces& settings;  ///< in the field's units
   const FilterReference& filter;
   const FilterReference* color_filter;  ///< over a second field; null: the isovalue gives the colour
   const TransferTable* volume;          ///< null: surfaces alone
-  double part;                          ///< world length of the volume's largest part
+  RayRule rule;                         ///< of the volume, without the ray's length
   std::vector<Vec3d> rgb;               ///< one an isovalue
   Vec3d lower{0}, upper{0};             ///< of what is drawn, finest cells
   std::vector<ClipPlane> planes;        ///< that cut it, finest cells
@@ -66,12 +67,17 @@ class SurfacePainter {
     if (scene.settings.ambient_occlusion) around_.emplace(scene.filter);
   }
 
+  /// What the volume between the surfaces of a ray may be off by, and what it took.
+  struct Cost {
+    double error = 0;
+    std::int64_t evaluations = 0;
+  };
   /// `start`: world distance from the eye to the first part; `lamp`: see LightIntegral.
-  void draw(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const std::optional<Mirror>& mirror, double start,
+  Cost draw(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const std::optional<Mirror>& mirror, double start,
             const LightIntegral::Arriving& lamp, double* pixel);
 
  private:
-  void draw_color(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const LightIntegral::Arriving& lamp, double* pixel);
+  Cost draw_color(ReferenceTracer& tracer, const std::vector<RayPart>& parts, const LightIntegral::Arriving& lamp, double* pixel);
   Vec3d color_at(const Vec3d& p, std::size_t surface, const Vec3d& direction);
   double open_share(const Vec3d& p, const Vec3d& up);
   Vec3d normal_at(const Vec3d& p);

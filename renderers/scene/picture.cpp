@@ -5,13 +5,16 @@
 
 #include <bit>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <limits>
 
 #include "structures/mesh/checked.hpp"
 #include "structures/mesh/error.hpp"
 #include "structures/mesh/quoted.hpp"
+#include "structures/mesh/value_units.hpp"
 #include "structures/mesh/whole_file.hpp"
 
 namespace amrtex {
@@ -25,6 +28,20 @@ std::vector<float> as_floats(const Picture& picture) {
   std::vector<float> floats(picture.values.size());
   for (std::size_t i = 0; i < floats.size(); ++i) floats[i] = static_cast<float>(picture.values[i]);
   return floats;
+}
+
+/// Do 32-bit floats hold the picture: each value, or of raw ones as much as a structure's floats would (value_units.hpp)?
+bool fits_floats(const Picture& picture) {
+  double min = std::numeric_limits<double>::infinity(), max = -min, least = 0;
+  bool exact = true;
+  for (const double v : picture.values) {
+    if (!std::isfinite(v)) continue;
+    exact = exact && static_cast<double>(static_cast<float>(v)) == v;
+    min = std::min(min, v);
+    max = std::max(max, v);
+    if (v != 0) least = least > 0 ? std::min(least, std::abs(v)) : std::abs(v);
+  }
+  return exact || picture.channels > 1 || floats_hold(min, max, least);
 }
 
 std::string npy_header(const Picture& picture, bool as_double) {
@@ -75,12 +92,13 @@ void read_values(std::ifstream& in, Picture& picture, std::size_t count, const s
 }  // namespace
 
 std::string picture_hash(const Picture& picture) {
-  const auto floats = as_floats(picture);
-  const XXH128_hash_t h = XXH3_128bits(floats.data(), floats.size() * sizeof(float));
+  const auto hash_of = [](const auto& values) { return XXH3_128bits(values.data(), values.size() * sizeof(values[0])); };
+  const XXH128_hash_t h = fits_floats(picture) ? hash_of(as_floats(picture)) : hash_of(picture.values);
   return fmt::format("{:016x}{:016x}", h.high64, h.low64);
 }
 
 void write_npy(const Picture& picture, const std::filesystem::path& path, bool as_double) {
+  as_double = as_double || !fits_floats(picture);
   std::string bytes = npy_header(picture, as_double);
   const auto add = [&](const auto& values) {
     bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(values[0]));

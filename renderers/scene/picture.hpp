@@ -11,7 +11,7 @@ namespace amrtex {
 
 /// Linear values, first row on top. 4 channels: premultiplied RGBA, or a normal and 1;
 /// 1 channel: the raw value of the modes projection and mip. Pictures of the GL
-/// context hold floats exactly.
+/// context are floats where the field's units are plain (value_units.hpp), else such times a power of two, and an offset.
 struct Picture {
   int width = 0;
   int height = 0;
@@ -31,11 +31,11 @@ struct Picture {
   const double* pixel(int x, int y) const { return const_cast<Picture*>(this)->pixel(x, y); }
 };
 
-/// Hash of the values as 32-bit floats.
+/// Hash of the values as 32-bit floats, or as doubles where floats do not hold them.
 std::string picture_hash(const Picture& picture);
 
-/// NumPy format, shape (height, width, channels); `as_double` for references.
-/// Written to a temporary name first. Throws Error with the path.
+/// NumPy format, shape (height, width, channels); 64-bit where `as_double`, for references, or where floats do not hold the
+/// values. Written to a temporary name first. Throws Error with the path.
 void write_npy(const Picture& picture, const std::filesystem::path& path, bool as_double);
 Picture read_npy(const std::filesystem::path& path);
 

@@ -53,7 +53,7 @@ Rows sampling_rows() {
   rows.push_back({{.name = "sampling",
                    .type = choice_type(texts_of(kSamplingNames)),
                    .reference = AffectsReference::no,
-                   .help = "where samples lie ([shaders/README.md](../shaders/README.md#sampling))",
+                   .help = "where samples lie ([docs/sampling.md](sampling.md))",
                    .column = {"sampling"}},
                   [](const Scene& s) -> Json { return sampling_name(s.settings.sampling); },
                   [](Scene& s, const Json& v) { s.settings.sampling = parse_sampling(v.get<std::string>()); }});
@@ -82,7 +82,7 @@ Rows sampling_rows() {
   rows.push_back({{.name = "integrator",
                    .type = integrators,
                    .reference = AffectsReference::no,
-                   .help = "how light follows from samples ([shaders/README.md](../shaders/README.md#integrators))",
+                   .help = "how light follows from samples ([docs/integrators.md](integrators.md))",
                    .column = {"integrator"},
                    .takes = {only_with("mode", {"dvr"}, "all but exponential_midpoint integrate a volume alone"),
                              {"sampling", {"adaptive"}, Otherwise::refused, "it chooses its intervals itself", {"tolerance"}}}},

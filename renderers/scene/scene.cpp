@@ -140,6 +140,23 @@ int RenderSettings::picture_channels() const {
   return mode == Mode::dvr ? 4 : 1;
 }
 
+void require_resolved(const DomainGeometry& geometry, const Scene& scene) {
+  constexpr double kSmallest = 1e-150, kLargest = 1e150;  // world; squares are doubles
+  constexpr double kFarthest = 0x1p41;                    // finest cells; a double tells 2^-12 of one apart
+  const Vec3d size = geometry.size();
+  const double longest = std::max({size.x, size.y, size.z});
+  if (!(geometry.smallest_edge() >= kSmallest && longest <= kLargest))
+    throw UnsupportedError(
+        fmt::format("domain: finest cells of {:.3g} in a domain of {:.3g} (longest edge); accepted: from {} to {}",
+                    geometry.smallest_edge(), longest, kSmallest, kLargest));
+  const Vec3d eye = glm::abs(geometry.in_finest_cells(scene.view.eye));
+  if (const double cells = std::max({eye.x, eye.y, eye.z}); cells > kFarthest)
+    throw UnsupportedError(
+        fmt::format("view: the eye lies {:.3g} finest cells from the domain's lower corner; accepted: at most {:.3g}, "
+                    "beyond which doubles do not tell places in a cell apart",
+                    cells, kFarthest));
+}
+
 ClipPlane in_finest_cells(const DomainGeometry& geometry, const ClipPlane& plane) {
   const auto largest = [](const Vec3d& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); };
   const double size = largest(plane.normal);

@@ -223,6 +223,10 @@ struct Scene {
   std::vector<FieldTransfer> more_fields = {};
 };
 
+/// Throws UnsupportedError where doubles do not tell the places of a scene apart: an eye too far away, a domain too large or
+/// small.
+void require_resolved(const DomainGeometry& geometry, const Scene& scene);
+
 /// Points of each curve of a transfer function that shaders evaluate as they are. More make a table, and are refused with several
 /// fields.
 inline constexpr std::size_t kMostExactPoints = 16;

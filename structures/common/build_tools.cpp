@@ -20,7 +20,16 @@ void ValueRange::add(double value) {
 
 namespace {
 
-/// How far a decoded value may lie from the one that was stored.
+/// A float, or the largest one.
+float as_float(double number) {
+  constexpr double kMost = std::numeric_limits<float>::max();
+  return static_cast<float>(std::clamp(number, -kMost, kMost));
+}
+
+/// How far a number may lie from that of the same value, which was once a double in field units.
+double value_slack(const ValueUnits& units) { return std::ldexp(std::abs(units.offset) / units.scale, -51); }
+
+/// How far a decoded number may lie from the one that was stored.
 double storage_slack(Storage storage, StorageScale scale, double largest) {
   double slack = 4e-7 * std::max(largest, storage == Storage::r32f ? 0.0 : std::abs(scale.scale));
   if (storage == Storage::r8) slack += scale.scale * (0.51 / 255);
@@ -33,15 +42,19 @@ double storage_slack(Storage storage, StorageScale scale, double largest) {
 
 double range_origin(const FieldStatistics& s, Storage storage, StorageScale scale) {
   if (std::isnan(s.min)) return 0;
+  const double min = scale.units.number(s.min), max = scale.units.number(s.max);
   // interpolants of values from 0 up stay there: regions of 0 then have the range (0, 0), which projections skip
-  if (s.min == 0 && (storage == Storage::r32f || storage == Storage::r64f)) return 0;
-  const double lowest = s.min - storage_slack(storage, scale, std::max(std::abs(s.min), std::abs(s.max)));
+  if (min == 0 && (storage == Storage::r32f || storage == Storage::r64f)) return 0;
+  const double lowest =
+      min - storage_slack(storage, scale.in_units(), std::max(std::abs(min), std::abs(max))) - value_slack(scale.units);
   return static_cast<double>(std::nextafter(static_cast<float>(lowest), -std::numeric_limits<float>::infinity()));
 }
 
 std::uint32_t encode_range(ValueRange range, double origin, Storage storage, StorageScale scale) {
   if (range.empty()) return kNoRange;
-  const double slack = storage_slack(storage, scale, std::max(std::abs(range.min), std::abs(range.max)));
+  range = {scale.units.number(range.min), scale.units.number(range.max)};
+  const double slack =
+      storage_slack(storage, scale.in_units(), std::max(std::abs(range.min), std::abs(range.max))) + value_slack(scale.units);
   // one part in 2^20 for the shader's own sum of origin and distance
   const double margin = slack + std::ldexp(std::abs(origin), -20);
   const auto low = static_cast<float>(std::max(range.min - margin - origin, 0.0) * (1 - 1e-6));
@@ -75,13 +88,13 @@ bool hidden(const SceneNeeds& needs, ValueRange range, double origin, Storage st
   const float low = static_cast<float>(origin) + std::bit_cast<float>(code << 16);
   const float high = static_cast<float>(origin) + std::bit_cast<float>(code & 0xffff0000U);
   for (const auto& [first, last] : needs.invisible)
-    if (low >= static_cast<float>(first) && high <= static_cast<float>(last)) return true;
+    if (low >= as_float(scale.units.number(first)) && high <= as_float(scale.units.number(last))) return true;
   return false;
 }
 
 void store_values(Storage storage, StorageScale scale, const double* values, std::size_t count, std::byte* data,
                   std::size_t first) {
-  if (storage == Storage::r32f) {
+  if (storage == Storage::r32f && scale.units.plain()) {
     auto* out = reinterpret_cast<float*>(data) + first;
     for (std::size_t i = 0; i < count; ++i) out[i] = std::isnan(values[i]) ? 0.0F : static_cast<float>(values[i]);
     return;
@@ -118,7 +131,10 @@ void write_box(const Box& box, std::uint32_t fourth, std::uint32_t eighth, std::
 
 double leaked_value(const FieldStatistics& s, const Vec3i& pool) {
   const double weight = 3 * std::ldexp(3.0, -24) * std::max({pool.x, pool.y, pool.z});
-  return weight * std::max({s.max - s.min, std::abs(s.min), std::abs(s.max)});
+  // of the numbers that texels hold, where what lies between is 0
+  const ValueUnits units = value_units(s);
+  const double min = units.number(s.min), max = units.number(s.max);
+  return weight * std::max({max - min, std::abs(min), std::abs(max)}) * units.scale;
 }
 
 bool power_of_two_ratios(const AmrHierarchy& hierarchy) {
@@ -144,18 +160,16 @@ int common_ratio_shift(const AmrHierarchy& hierarchy) {
 
 namespace {
 
-/// Throws UnsupportedError where 32-bit floats cannot hold the values, or a linear filter their differences.
-void require_float_values(const Encoding& encoding, const AmrHierarchy& h, const BuildRequest& request) {
-  constexpr double kMost = std::numeric_limits<float>::max();
-  if (request.storage == Storage::r64f) return;  // of the CPU's double precision
+/// Throws UnsupportedError where sums of values that builders make are no double.
+void require_finite_sums(const Encoding& encoding, const AmrHierarchy& h, const BuildRequest& request) {
+  constexpr double kMost = 0x1p1000;
   for (int i = 0; i < request.field_count(); ++i) {
     const FieldStatistics& s = h.statistics(request.field_at(i));
-    const bool linear = request.needs.filter != Filter::nearest;
-    if (s.max > kMost || s.min < -kMost || (linear && s.max - s.min > kMost))
+    if (s.max > kMost || s.min < -kMost)
       throw UnsupportedError(
-          fmt::format("encoding {}: values from {:.3g} to {:.3g} with filter {}; accepted: magnitudes{} up to {:.3g}, what a "
-                      "32-bit float holds",
-                      encoding.name(), s.min, s.max, filter_name(request.needs.filter), linear ? " and differences" : "", kMost));
+          fmt::format("encoding {}: values from {:.3g} to {:.3g}; accepted: magnitudes up to {:.3g}, of which "
+                      "doubles hold sums",
+                      encoding.name(), s.min, s.max, kMost));
   }
 }
 
@@ -178,7 +192,7 @@ EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy
   require_fields(encoding, hierarchy, request);
   require_level_of_detail(encoding, request.needs);
   require_analytic_gradients(encoding, request.needs);
-  require_float_values(encoding, hierarchy, request);
+  require_finite_sums(encoding, hierarchy, request);
   EncodedField field;
   field.encoding = encoding.name();
   field.build_parameters = parameters;
@@ -186,11 +200,12 @@ EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy
   field.filtering = stored_filtering(request);
   field.storage = request.storage;
   const FieldStatistics& s = hierarchy.statistics(request.field);
-  field.scale = storage_scale(request.storage, s.min, s.max);
+  field.scale = storage_scale(request.storage, s);
+  for (int i = 0; i < request.field_count(); ++i) field.values.push_back(hierarchy.statistics(request.field_at(i)));
   field.field_count = request.field_count();
   for (const int other : request.more_fields) {
     const FieldStatistics& o = hierarchy.statistics(other);
-    field.more_scales.push_back(storage_scale(request.storage, o.min, o.max));
+    field.more_scales.push_back(storage_scale(request.storage, o));
     if (request.needs.field_ranges)
       field.more_range_origins.push_back(range_origin(o, request.storage, field.more_scales.back()));
   }

@@ -26,10 +26,10 @@ inline constexpr std::uint32_t kNoRange = 0xffffffffU;
 /// skip it, and no isovalue has all of it on one side, so that a ray does not take a side there.
 inline constexpr std::uint32_t kVacantRange = 0x00007f80U;
 
-/// What ranges are relative to: at most every value that the shader can return.
+/// What ranges are relative to: at most every number that the shader can return.
 double range_origin(const FieldStatistics& statistics, Storage storage, StorageScale scale);
 
-/// The range of everything that fetch_field may return for values stored in this format, in
+/// The range of everything that fetch_field may return for values stored in this format, as numbers in the field's units and in
 /// 32 bits: distances of minimum (lower half) and maximum (upper half) from the origin as the
 /// upper halves of floats, rounded outwards. 8 bits of mantissa and of exponent, so that
 /// skipping works for fields of any magnitude. decode_range() in contract.glsl reads it.

@@ -69,10 +69,11 @@ MemoryByRole& MemoryByRole::operator+=(const MemoryByRole& other) {
 
 std::string element_name(std::string_view name, int i) { return i == 0 ? std::string(name) : fmt::format("{}[{}]", name, i); }
 
-StorageScale storage_scale(Storage storage, double min, double max) {
-  if (storage == Storage::r32f || storage == Storage::r64f) return {};
-  if (!(max > min)) return {std::isfinite(min) ? min : 0, 1};
-  return {min, max - min};
+StorageScale storage_scale(Storage storage, const FieldStatistics& s) {
+  const ValueUnits units = value_units(s);
+  if (storage == Storage::r32f || storage == Storage::r64f) return {units.offset, units.scale, units};
+  if (!(s.max > s.min)) return {std::isfinite(s.min) ? s.min : 0, units.scale, units};
+  return {s.min, s.max - s.min, units};
 }
 
 void store_value(Storage storage, StorageScale scale, double value, std::byte* data, std::size_t index) {
@@ -88,10 +89,10 @@ void store_value(Storage storage, StorageScale scale, double value, std::byte* d
       put(data, index, glm::packHalf1x16(static_cast<float>(code)));
       break;
     case Storage::r32f:
-      put(data, index, static_cast<float>(value));
+      put(data, index, static_cast<float>(code));
       break;
     case Storage::r64f:
-      put(data, index, value);
+      put(data, index, code);
       break;
     default:
       assert(false);
@@ -101,15 +102,15 @@ void store_value(Storage storage, StorageScale scale, double value, std::byte* d
 double load_value(Storage storage, StorageScale scale, const std::byte* data, std::size_t index) {
   switch (storage) {
     case Storage::r8:
-      return scale.offset + scale.scale * (get<std::uint8_t>(data, index) / 255.0);
+      return scale.value(get<std::uint8_t>(data, index) / 255.0);
     case Storage::r16:
-      return scale.offset + scale.scale * (get<std::uint16_t>(data, index) / 65535.0);
+      return scale.value(get<std::uint16_t>(data, index) / 65535.0);
     case Storage::r16f:
-      return scale.offset + scale.scale * static_cast<double>(glm::unpackHalf1x16(get<std::uint16_t>(data, index)));
+      return scale.value(static_cast<double>(glm::unpackHalf1x16(get<std::uint16_t>(data, index))));
     case Storage::r32f:
-      return static_cast<double>(get<float>(data, index));
+      return scale.value(static_cast<double>(get<float>(data, index)));
     case Storage::r64f:
-      return get<double>(data, index);
+      return scale.value(get<double>(data, index));
     default:
       assert(false);
       return 0;

@@ -12,6 +12,7 @@
 
 #include "structures/mesh/checked.hpp"
 #include "structures/mesh/spaces.hpp"
+#include "structures/mesh/value_units.hpp"
 
 namespace amrtex {
 
@@ -20,8 +21,8 @@ enum class TexelFormat { r8, r16, r16f, r32f, r64f, r32ui, rg32ui, rgba32ui, rg3
 int texel_bytes(TexelFormat format);
 std::string_view format_name(TexelFormat format);
 
-/// Formats in which values may be stored: the `storage` of a record. All but r32f
-/// hold (v - a) / b with a, b in the record; r64f exists on the CPU only and
+/// Formats in which values may be stored: the `storage` of a record. All hold (v - a) / b with a, b in the
+/// record, of r32f the field's own units (value_units.hpp); r64f holds the same in double, exists on the CPU only and
 /// separates the error of the encoding from that of its storage.
 using Storage = TexelFormat;
 /// Throws a UsageError that names r8, r16, r16f, r32f.
@@ -74,10 +75,15 @@ std::string element_name(std::string_view name, int i);
 struct StorageScale {
   double offset = 0;  ///< a
   double scale = 1;   ///< b
+  ValueUnits units;   ///< of the numbers that shaders make of codes
+
+  double value(double code) const { return offset == 0 ? scale * code : offset + scale * code; }
+  /// a, b of number = a + b code.
+  StorageScale in_units() const { return {units.number(offset), scale / units.scale, {}}; }
 };
 
-/// a = 0, b = 1 for r32f and r64f; maps [min, max] to [0, 1] otherwise.
-StorageScale storage_scale(Storage storage, double min, double max);
+/// Codes are numbers in the field's units for r32f and r64f; others map [min, max] to [0, 1].
+StorageScale storage_scale(Storage storage, const FieldStatistics& statistics);
 /// Writes one value, rounded to nearest, as texel `index` of `data`.
 void store_value(Storage storage, StorageScale scale, double value, std::byte* data, std::size_t index);
 /// The value that texel `index` stands for.

@@ -116,7 +116,7 @@ void Layout::require_limits() const {
   const ContextInfo& context = request_.context;
   const auto passes = [&](const Part& p) {
     if (p.kind == HostTexture::Kind::buffer) return p.bytes() > most_bytes(p, context);
-    return std::max({p.size.x, p.size.y, p.size.z}) > context.max_3d_texture_size;
+    return std::max({p.size.x, p.size.y, p.size.z}) > context.max_3d_texture_size || p.bytes() > context.max_texture_bytes;
   };
   const Part* worst = nullptr;
   for (const Part& p : parts_)
@@ -125,8 +125,9 @@ void Layout::require_limits() const {
   const std::string sizes =
       worst->kind == HostTexture::Kind::buffer
           ? fmt::format("{} bytes; accepted by this context: a buffer of at most {}", worst->bytes(), most_bytes(*worst, context))
-          : fmt::format("{} x {} x {} texels; accepted by this context: a 3D texture of at most {} along an axis", worst->size.x,
-                        worst->size.y, worst->size.z, context.max_3d_texture_size);
+          : fmt::format("{} x {} x {} texels ({} bytes); accepted by this context: a 3D texture of at most {} along an axis{}",
+                        worst->size.x, worst->size.y, worst->size.z, worst->bytes(), context.max_3d_texture_size,
+                        context.has_texture_limit() ? fmt::format(" and {} bytes", context.max_texture_bytes) : "");
   throw UnsupportedError(
       fmt::format("encoding {} with {}: {}: {}{}", encoding_.name(), request_.parameters.dump(), worst->what, sizes, remedy_));
 }

@@ -46,6 +46,7 @@ struct Part {
   Need need = Need::none;
   std::optional<std::int64_t> saved_bytes = {};  ///< by its absence, where these are not its own
 
+  /// INT64_MAX where they take more than 63 bits, which a texture of a deep mesh would.
   std::int64_t texels() const;
   std::int64_t bytes() const;
   HostTexture allocate() const;

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "exa_plan.hpp"
-#include "structures/common/build_tools.hpp"
+#include "structures/common/store_box.hpp"
 #include "structures/mesh/level_values.hpp"
 
 namespace amrtex::exa {
@@ -57,15 +57,9 @@ class BrickWriter {
   void store(std::size_t brick, int number) {
     const Vec3i shift = plan_.packing.at[brick] - box_.lower;
     HostTexture& pool = *out_.pools[static_cast<std::size_t>(number)];
-    const Box all{Vec3i(0), pool.size};
-    const auto row = static_cast<std::size_t>(box_.size().x);
-    for (int z = box_.lower.z; z < box_.upper.z; ++z)
-      for (int y = box_.lower.y; y < box_.upper.y; ++y) {
-        const Vec3i first(box_.lower.x, y, z);
-        store_values(pool.format, field_.scale_of(number), &values_[box_.offset(first)], row, pool.data.data(),
-                     all.offset(first + shift));
-      }
+    store_box(box_, values_, shift, field_.scale_of(number), pool);
     if (out_.validity == nullptr) return;
+    const Box all{Vec3i(0), pool.size};
     auto* words = out_.validity->as<std::uint32_t>() + number * plan_.validity_words;
     std::size_t i = 0;
     for_each_cell(box_, [&](const Vec3i& c) {

@@ -519,5 +519,48 @@ TEST(Exabricks, NearestVolumesHoldCellsRegionsAndTheirTreeAndFivePercent) {
   });
 }
 
+// ---- filtering by the texture unit
+
+/// Of the level values within two cells of a place, whatever level's: what pieces about it are filtered between.
+double widest_difference(const AmrHierarchy& h, const FinestPosition& p) {
+  double widest = 0;
+  for (int level = 0; level < h.level_count(); ++level) widest = std::max(widest, local_range(h, level, p));
+  return widest;
+}
+
+struct PoolError {
+  double texels = 0;  ///< largest error over the differences about the place: as if the texture unit had read so far off
+  double bound = 0;   ///< of that
+};
+
+PoolError hardware_error(const AmrHierarchy& h, const Json& parameters) {
+  const auto at = probe_positions(h, 200);
+  const EncodedField field = exa_field(h, Filter::basis, parameters, {.filtering = Filtering::hardware});
+  const Vec3i pool = field.find("tex_exa_pool")->size;
+  Context& gl = context(ContextKind::egl);
+  const auto got = probe_on_gl(gl, h, Structure(gl, field), at);
+  const Values expected = reference_values(h, field.definition, at);
+  PoolError error;
+  error.bound = 3 * 2 * 4 * 0x1p-24 * std::max({pool.x, pool.y, pool.z});  // README.md, three axes
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    if (!expected[i]) continue;
+    // what float arithmetic loses is no matter of the texture unit
+    const double off = std::abs(got[i].value - *expected[i]) - 2e-6 * value_range(h);
+    if (off > 0) error.texels = std::max(error.texels, off / widest_difference(h, at[i]));
+  }
+  return error;
+}
+
+TEST(ExabricksHardware, ErrsByWhatThePoolsCoordinateIsRoundedBy) {
+  for (std::uint64_t seed = 0; seed < 12; ++seed)
+    for (const int border : {0, 1})
+      for (const int width : {2, 32}) {
+        const AmrHierarchy h = seed == 0 ? nested(waves).hierarchy() : small_random_mesh(seed);
+        const PoolError error = hardware_error(h, {{"border", border}, {"brick_width", width}});
+        EXPECT_LE(error.texels, error.bound) << "seed " << seed << " border " << border << " brick_width " << width;
+        fmt::print("seed {} border {} width {}: {:.3g} of {:.3g}\n", seed, border, width, error.texels, error.bound);
+      }
+}
+
 }  // namespace
 }  // namespace amrtex

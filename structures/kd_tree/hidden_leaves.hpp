@@ -47,7 +47,7 @@ inline ValueRange leaf_range(const AmrHierarchy& h, int field, const Leaf& leaf,
 inline std::vector<std::uint8_t> hidden_leaves(const AmrHierarchy& h, const BuildRequest& request, const Tree& tree,
                                                const LeafTexels& texels) {
   const FieldStatistics& s = h.statistics(request.field);
-  const StorageScale scale = storage_scale(request.storage, s.min, s.max);
+  const StorageScale scale = storage_scale(request.storage, s);
   const double origin = range_origin(s, request.storage, scale);
   std::vector<std::uint8_t> hides(tree.leaves.size());
   std::vector<HatNode> nodes;

@@ -8,6 +8,7 @@
 #include "kd_bricks.hpp"
 #include "kd_hats.hpp"
 #include "structures/common/build_tools.hpp"
+#include "structures/common/store_box.hpp"
 #include "structures/mesh/level_values.hpp"
 #include "structures/mesh/vertex_values.hpp"
 
@@ -80,15 +81,7 @@ class BrickWriter {
     const auto b = static_cast<std::size_t>(brick);
     const Vec3i shift = plan_.packing.at[b] - plan_.bricks[b].texels(options_).lower;
     const int textures = options_.bindless ? brick * field_.field_count : 0;  // of bricks before this one
-    HostTexture& texture = out_.values[textures + number];
-    const Box all{Vec3i(0), texture.size};
-    const auto row = static_cast<std::size_t>(box_.size().x);
-    for (int z = box_.lower.z; z < box_.upper.z; ++z)
-      for (int y = box_.lower.y; y < box_.upper.y; ++y) {
-        const Vec3i first(box_.lower.x, y, z);
-        store_values(texture.format, field_.scale_of(number), &values_[box_.offset(first)], row, texture.data.data(),
-                     all.offset(first + shift));
-      }
+    store_box(box_, values_, shift, field_.scale_of(number), out_.values[textures + number]);
   }
 
   /// Range and validity bits of what was read.

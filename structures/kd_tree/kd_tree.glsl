@@ -39,6 +39,8 @@ BUFFER(uint, kd_validity, kd_validity_block)  // one bit a cell, each field of e
 
 #define AMRTEX_BASIS_MISSING AMRTEX_VALIDITY
 #define AMRTEX_BASIS_SEARCH (AMRTEX_FILTER == AMRTEX_FILTER_BASIS)
+// A leaf's neighbours may be finer.
+#define AMRTEX_FINER_HATS (AMRTEX_FILTER == AMRTEX_FILTER_BASIS)
 #include "basis.glsl"
 
 int kd_axis(IN(uvec2) node) { return int(node.x >> uint(AMRTEX_KD_CHILD_BITS + AMRTEX_KD_LEVEL_BITS)); }

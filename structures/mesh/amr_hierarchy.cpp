@@ -377,6 +377,7 @@ FieldStatistics AmrHierarchy::Data::measure(std::size_t field) const {
         }
         s.min = std::isnan(s.min) ? v : std::min(s.min, v);
         s.max = std::isnan(s.max) ? v : std::max(s.max, v);
+        if (v != 0) s.least_magnitude = s.least_magnitude > 0 ? std::min(s.least_magnitude, std::abs(v)) : std::abs(v);
         const double y = v - comp;
         const double t = sum + y;
         comp = (t - sum) - y;

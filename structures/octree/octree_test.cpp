@@ -10,10 +10,10 @@
 
 #include "renderers/bindings/scene_bindings.hpp"
 #include "renderers/consumers/raycaster.hpp"
-#include "shaders/shader_library.hpp"
 #include "structures/generators/random_mesh.hpp"
 #include "structures/generators/synthetic.hpp"
 #include "structures/octree/octree_layout.h"
+#include "tests/gl_probe.hpp"
 #include "tests/leave_out_cases.hpp"
 
 namespace amrtex {
@@ -538,40 +538,27 @@ TEST(Octree, MoreNodesThanATextureHoldsAreRefusedWithTheNumbers) {
 
 constexpr const char* kGradientProbe = R"(#include "portable_glsl.h"
 #include "contract.glsl"
-layout(local_size_x = 1) in;
-layout(std430) writeonly buffer result_block { vec4 result; };
-uniform ivec3 u_cell;
+layout(local_size_x = 64) in;
+layout(std430) readonly buffer cells_block { ivec4 cells[]; };
+layout(std430) writeonly buffer results_block { vec4 results[]; };
+uniform int u_count;
 void main() {
+  int i = int(gl_GlobalInvocationID.x);
+  if (i >= u_count) return;
   Position p;
-  p.cell = u_cell;
+  p.cell = cells[i].xyz;
   p.fraction = vec3(0.3, 0.6, 0.2);
   Region r;
   bool inside = locate(p, r);
-  result = vec4(fetch_gradient(r, region_position(r, p)), inside ? 1.0 : 0.0);
+  results[i] = vec4(fetch_gradient(r, region_position(r, p)), inside ? 1.0 : 0.0);
 }
 )";
 
 glm::vec4 gradient_at(const AmrHierarchy& h, const EncodedField& field, const Vec3i& cell) {
-  Context& gl = context(ContextKind::egl);
-  ShaderFiles files{{"gradient_probe.comp", kGradientProbe}};
-  for (const ShaderFile& f : shader_files()) files.emplace(f.path, f.text);
-  ShaderKey key;
-  key.entry = "gradient_probe.comp";
-  key.use(field.shader).define("AMRTEX_RAY_DOUBLE", 0);
-  Program program(gl, assemble_shader(key, files));
-  const GlBuffer result = make_buffer(gl);
-  gl.gl().NamedBufferStorage(result.id(), sizeof(glm::vec4), nullptr, 0);
-  const GpuField gpu(field, gl);
-  program.use();
-  for (const UniformValue& u : field_uniforms(h, field)) program.set_optional(u);
-  program.set("u_cell", cell);
-  program.bind_buffer("result_block", result.id());
-  gpu.bind(program);
-  gl.gl().DispatchCompute(1, 1, 1);
-  gl.gl().MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  glm::vec4 value;
-  gl.gl().GetNamedBufferSubData(result.id(), 0, sizeof value, &value);
-  return value;
+  const std::vector<glm::ivec4> cells{{cell, 0}};
+  return run_probe<glm::vec4>(context(ContextKind::egl), field, field_uniforms(h, field), kGradientProbe, 1,
+                              {{"cells_block", cells}})
+      .front();
 }
 
 TEST(Octree, GradientsKeepTheirDirection) {

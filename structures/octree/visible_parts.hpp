@@ -23,7 +23,7 @@ class VisibleParts {
   VisibleParts(const AmrHierarchy& h, const BuildRequest& request, const TreeCell& root, bool ghosts)
       : hierarchy_(h), request_(request), root_(root), ghosts_(ghosts), kept_(static_cast<std::size_t>(root.shift) + 1) {
     const FieldStatistics& s = h.statistics(request.field);
-    scale_ = storage_scale(request.storage, s.min, s.max);
+    scale_ = storage_scale(request.storage, s);
     origin_ = range_origin(s, request.storage, scale_);
     for (int level = 0; level < h.level_count(); ++level) find_visible(level);
     for (std::size_t shift = 1; shift < kept_.size(); ++shift) {

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -83,15 +85,16 @@ class PageReader {
   std::vector<std::uint8_t> missing_;
 };
 
-/// The table holds a float: what it would lose, a page of the same storage must lose as well.
-inline bool constant_is_exact(double v, Storage storage) {
-  return storage == Storage::r32f || static_cast<double>(static_cast<float>(v)) == v;
+/// The table holds a float in the field's units: what it would lose, a page of the same storage must lose as well.
+inline bool constant_is_exact(double number, Storage storage) {
+  return storage == Storage::r32f || static_cast<double>(static_cast<float>(number)) == number;
 }
 
 /// A constant page is one of a single field: an entry has room for one value, and what is constant in
 /// one field seldom is in the others.
-inline bool is_constant(const PageContents& c, const BuildRequest& request) {
-  return request.more_fields.empty() && c.all && c.range.min == c.range.max && constant_is_exact(c.range.min, request.storage);
+inline bool is_constant(const PageContents& c, const BuildRequest& request, const ValueUnits& units) {
+  return request.more_fields.empty() && c.all && c.range.min == c.range.max &&
+         constant_is_exact(units.number(c.range.min), request.storage);
 }
 
 /// Which pages the scene cannot show.
@@ -99,8 +102,9 @@ class HiddenPages {
  public:
   HiddenPages(const AmrHierarchy& h, const BuildRequest& request, const Options& o)
       : request_(request), statistics_(h.statistics(request.field)), leak_(most_leaked(request, o)) {}
+  ValueUnits units() const { return value_units(statistics_); }
   bool operator()(const PageContents& c) const {
-    const StorageScale scale = storage_scale(request_.storage, statistics_.min, statistics_.max);
+    const StorageScale scale = storage_scale(request_.storage, statistics_);
     ValueRange range = c.range;
     if (!range.empty()) range = {range.min - leak_, range.max + leak_};
     return hidden(request_.needs, range, range_origin(statistics_, request_.storage, scale), request_.storage, scale);
@@ -124,8 +128,65 @@ inline void classify(PageReader& reader, const BuildRequest& request, const Hidd
   if (page.pruned) return;  // absent, at its own level: rays step over the same box
   for (const int other : request.more_fields)
     if (!c.any) c = reader.read(page, other);
-  page.kind = !c.any ? AMRTEX_PAGE_ABSENT : is_constant(c, request) ? AMRTEX_PAGE_CONSTANT : AMRTEX_PAGE_STORED;
-  if (page.kind == AMRTEX_PAGE_CONSTANT) page.green = std::bit_cast<std::uint32_t>(static_cast<float>(c.range.min));
+  page.kind = !c.any                                       ? AMRTEX_PAGE_ABSENT
+              : is_constant(c, request, is_hidden.units()) ? AMRTEX_PAGE_CONSTANT
+                                                           : AMRTEX_PAGE_STORED;
+  if (page.kind == AMRTEX_PAGE_CONSTANT)
+    page.green = std::bit_cast<std::uint32_t>(static_cast<float>(is_hidden.units().number(c.range.min)));
+}
+
+/// Is a page stored, as two of its values alone tell? Two that differ make no constant; where several fields are drawn no page is
+/// one.
+class SurelyStored {
+ public:
+  SurelyStored(const AmrHierarchy& h, const BuildRequest& request, const Options& o) : h_(h), request_(request), options_(o) {}
+
+  bool operator()(const Page& page) const {
+    if (!request_.needs.invisible.empty()) return false;  // it may be hidden
+    const Vec3i first = page.index_in_level * options_.page_size;
+    const Box inside = intersection(Box{first, first + Vec3i(options_.page_size)}, h_.domain(page.level));
+    for (int number = 0; number < request_.field_count(); ++number) {
+      const int field = request_.field_at(number);
+      const double a = h_.level_value(page.level, inside.lower, field);
+      const double b = h_.level_value(page.level, inside.upper - Vec3i(1), field);
+      if (request_.field_count() > 1 && !(std::isnan(a) && std::isnan(b))) return true;
+      if (request_.field_count() == 1 && !std::isnan(a) && !std::isnan(b) && a != b)
+        return !options_.nodes || vertices_differ(page);
+    }
+    return false;
+  }
+
+ private:
+  /// The means of cells that differ may be equal.
+  bool vertices_differ(const Page& page) const {
+    const Vec3i lower = page.index_in_level * options_.page_size;
+    const auto at = [&](const Vec3i& vertex) {
+      double value = 0;
+      vertex_values(h_, request_.field, page.level, {vertex, vertex + Vec3i(1)}, {&value, 1});
+      return value;
+    };
+    return at(lower) != at(lower + Vec3i(options_.page_size));
+  }
+
+  const AmrHierarchy& h_;
+  const BuildRequest& request_;
+  const Options& options_;
+};
+
+/// How many pages are surely stored; counting ends beyond `enough`, in whole blocks of pages, so that the number is the same at
+/// each run.
+inline std::int64_t count_surely_stored(const SurelyStored& is_stored, const std::vector<Page>& pages, std::int64_t enough) {
+  constexpr std::size_t kBlock = 1 << 14;
+  std::int64_t stored = 0;
+  for (std::size_t first = 0; first < pages.size() && stored <= enough; first += kBlock)
+    stored += tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(first, std::min(first + kBlock, pages.size()), 64), std::int64_t{0},
+        [&](const auto& range, std::int64_t sum) {
+          for (std::size_t i = range.begin(); i != range.end(); ++i) sum += is_stored(pages[i]) ? 1 : 0;
+          return sum;
+        },
+        std::plus<>());
+  return stored;
 }
 
 /// Reads every page to learn what is absent or constant, then numbers the stored ones.

@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <array>
 
+#include "page_draw_tree.hpp"
 #include "page_partition.hpp"
+#include "page_pool.hpp"
 #include "page_reader.hpp"
 #include "page_table_layout.h"
+#include "page_table_plan.hpp"
 #include "page_writer.hpp"
 #include "structures/common/build_tools.hpp"
 #include "structures/common/layout.hpp"
@@ -34,6 +37,7 @@ MemoryByRole texels_by_role(const AmrHierarchy& h, const Options& o, const std::
 /// Counts of pages, and where they go.
 struct Sizes {
   std::int64_t stored = 0, constant = 0, pruned = 0;
+  std::int64_t without_mesh = 0;  ///< pages of level 0 that are not listed
   TablePlan table;
   PoolLayout pool;
 };
@@ -58,7 +62,11 @@ class PageTable final : public Encoding {
 
  private:
   Options options(const Json& parameters, const SceneNeeds& needs) const;
-  Sizes sizes(const AmrHierarchy& h, const BuildRequest& request, const Options& o, std::vector<Page>& pages) const;
+  void require_pages(const BuildRequest& request, const Options& o, const Division& division) const;
+  void require_least(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Division& division,
+                     const std::vector<Page>& pages) const;
+  Sizes sizes(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Division& division,
+              std::vector<Page>& pages) const;
   Layout layout(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Sizes& s,
                 const std::vector<Page>& pages) const;
 };
@@ -78,24 +86,66 @@ Options PageTable::options(const Json& parameters, const SceneNeeds& needs) cons
   return o;
 }
 
+/// What all pages would take.
+std::int64_t bytes_of_pages(const BuildRequest& request, const Options& o, std::int64_t pages) {
+  return (CheckedSize(pages) * CheckedSize(o.page_texels()) * CheckedSize(request.field_count() * texel_bytes(request.storage)))
+      .or_most();
+}
+
+TablePlan plan_table(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Division& division,
+                     const std::vector<Page>& pages, bool constants) {
+  return TablePlanner(h, division, request, request.needs.value_ranges || constants)
+      .plan(pages, bytes_of_pages(request, o, std::ssize(pages)));
+}
+
+PoolLayout plan_pool(const BuildRequest& request, const Options& o, std::int64_t stored) {
+  PoolLayout pool;
+  const int limit = request.context.max_3d_texture_size;
+  if (!lay_out(std::max<std::int64_t>(stored, 1), o.edge, limit, pool))
+    throw UnsupportedError(
+        fmt::format("encoding page_table with page_size {}: {} pages of {}^3 texels do not fit a 3D texture of {} texels an axis",
+                    o.page_size, stored, o.edge, limit));
+  return pool;
+}
+
+/// From the boxes of patches, before a page is listed.
+void PageTable::require_pages(const BuildRequest& request, const Options& o, const Division& division) const {
+  const std::int64_t pages = division.pages();
+  if (pages <= kMostPages) return;
+  throw UnsupportedError(fmt::format(
+      "encoding page_table with page_size {}: {} pages (about {:.2g} bytes), an entry of the table numbers at most {}; a larger "
+      "page_size needs fewer",
+      o.page_size, pages, static_cast<double>(bytes_of_pages(request, o, pages)), kMostPages));
+}
+
+/// Where all pages would pass a limit: what surely are stored may do so, and nothing needs to be read to know it.
+void PageTable::require_least(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Division& division,
+                              const std::vector<Page>& pages) const {
+  const std::int64_t most = std::min(request.memory_limit, request.context.max_texture_bytes);
+  if (bytes_of_pages(request, o, std::ssize(pages)) <= most) return;
+  Sizes least;
+  const std::int64_t enough = most / bytes_of_pages(request, o, 1);
+  least.stored = count_surely_stored(SurelyStored(h, request, o), pages, enough);
+  least.table = plan_table(h, request, o, division, pages, false);
+  least.pool = plan_pool(request, o, least.stored);
+  Layout parts = layout(h, request, o, least, pages);
+  parts.set_remedy(fmt::format("; page_size is {}, at least {} of {} pages are stored", o.page_size, least.stored, pages.size()));
+  parts.require_limits();
+  parts.require_budget();
+}
+
 /// Reads all pages, and lays out what they need.
-Sizes PageTable::sizes(const AmrHierarchy& h, const BuildRequest& request, const Options& o, std::vector<Page>& pages) const {
+Sizes PageTable::sizes(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Division& division,
+                       std::vector<Page>& pages) const {
   Sizes s;
+  s.without_mesh = pages_without_mesh(division);
   s.stored = number_pages(h, request, o, pages);
   for (const Page& p : pages) {
     s.constant += p.kind == AMRTEX_PAGE_CONSTANT ? 1 : 0;
     s.pruned += p.pruned ? 1 : 0;
   }
-  s.table = plan_table(h, pages, o.page_size, request, s.constant > 0);
-  const int limit = request.context.max_3d_texture_size;
-  if (!lay_out(std::max<std::int64_t>(s.stored, 1), o.edge, limit, s.pool))
-    throw UnsupportedError(
-        fmt::format("encoding page_table with page_size {}: {} pages of {}^3 texels do not fit a 3D texture of {} texels an axis",
-                    o.page_size, s.stored, o.edge, limit));
-  if (s.stored > kMostPages)
-    throw UnsupportedError(
-        fmt::format("encoding page_table with page_size {}: {} pages, an entry of the table numbers at most {}", o.page_size,
-                    s.stored, kMostPages));
+  s.table = plan_table(h, request, o, division, pages, s.constant > 0);
+  s.pool = plan_pool(request, o, s.stored);
   return s;
 }
 
@@ -111,13 +161,15 @@ Layout PageTable::layout(const AmrHierarchy& h, const BuildRequest& request, con
   }
   layout.add(s.table.top_part());
   layout.add(s.table.sub_part());
+  layout.add(s.table.nodes_part());
+  layout.add(s.table.stages_part());
   for (int number = 0; number < fields; ++number)
     layout.add(layout.values("tex_pages", number, s.pool.texels()).holding(texels_by_role(h, o, pages)));
   layout.add(buffer_part("page_validity", "validity bits", TexelFormat::r32ui, s.stored * fields * o.page_words())
                  .when(validity, "every cell has a value", Need::validity));
   if (!s.table.green)  // as large as the first
     layout.leave_out({"second channel of the table", "no region is skipped and no page is constant",
-                      s.table.top_part().bytes() + (s.table.two_levels() ? s.table.sub_part().bytes() : 0), Need::value_ranges});
+                      s.table.bytes() - s.table.stages_bytes(), Need::value_ranges});
   if (!o.nodes && o.border == 0) {
     const std::int64_t with_border = std::int64_t{o.page_size + 2} * (o.page_size + 2) * (o.page_size + 2);
     layout.leave_out({"border layer", "the filter nearest reads one cell",
@@ -130,7 +182,7 @@ Layout PageTable::layout(const AmrHierarchy& h, const BuildRequest& request, con
 }
 
 Json statistics(const AmrHierarchy& h, const Options& o, const std::vector<Page>& pages, const Sizes& s) {
-  std::int64_t absent = 0;
+  std::int64_t absent = s.without_mesh;
   std::int64_t cells = 0;
   std::vector<std::int64_t> levels(static_cast<std::size_t>(h.level_count()));
   for (const Page& p : pages) {
@@ -152,7 +204,7 @@ Json statistics(const AmrHierarchy& h, const Options& o, const std::vector<Page>
   json["border_overhead"] = static_cast<double>(s.stored * (o.page_texels() - o.page_cells())) / pages_cells;
   json["border_overhead_formula"] = static_cast<double>(o.page_texels()) / static_cast<double>(o.page_cells()) - 1;
   json["oversampling"] = static_cast<double>(cells) / static_cast<double>(h.leaf_cells());
-  json["table_levels"] = s.table.two_levels() ? 2 : 1;
+  json["table_levels"] = s.table.levels();
   json["table_entries"] = s.table.top_part().texels();
   json["subtables"] = s.table.subtables;
   return json;
@@ -166,13 +218,15 @@ void add_shader_inputs(const AmrHierarchy& h, const Options& o, const Sizes& siz
   defines.emplace_back("AMRTEX_PAGE_EDGE", o.edge);
   defines.emplace_back("AMRTEX_PAGE_NODES", o.nodes ? 1 : 0);
   defines.emplace_back("AMRTEX_PAGE_CONSTANTS", size.constant > 0 ? 1 : 0);
-  defines.emplace_back("AMRTEX_PAGE_TABLE_LEVELS", table.two_levels() ? 2 : 1);
+  defines.emplace_back("AMRTEX_PAGE_TABLE_LEVELS", table.levels());
+  defines.emplace_back("AMRTEX_PAGE_TABLE_TREE", table.tree && table.levels() > 1 ? 1 : 0);
+  defines.emplace_back("AMRTEX_PAGE_ENTRY_WORDS", table.entry_words());
   const Vec3i pool = size.pool.texels();
   defines.emplace_back("AMRTEX_POOL_X", pool.x);
   defines.emplace_back("AMRTEX_POOL_Y", pool.y);
   defines.emplace_back("AMRTEX_POOL_Z", pool.z);
   auto& uniforms = field.integer_uniforms;
-  uniforms.emplace_back("u_page_table", Vec3i(o.page_size * h.cell_width(table.top_level), 0, 0));
+  uniforms.emplace_back("u_page_table", Vec3i(table.entry_width, 0, 0));
   uniforms.emplace_back("u_pool_shift", size.pool.shift);
   if (!table.two_levels()) return;
   uniforms.emplace_back("u_subtable", Vec3i(table.sub_edge, o.page_size * h.cell_width(table.finest_level), 0));
@@ -188,8 +242,11 @@ EncodedField PageTable::build(const AmrHierarchy& h, const BuildRequest& request
   if (h.level_count() > kMostLevels)
     throw UnsupportedError(
         fmt::format("encoding page_table: {} levels, an entry of the table tells at most {}", h.level_count(), kMostLevels));
-  std::vector<Page> pages = partition(h, o.page_size);
-  const Sizes size = sizes(h, request, o, pages);
+  const Division division(h, o.page_size);
+  require_pages(request, o, division);
+  std::vector<Page> pages = partition(division);
+  require_least(h, request, o, division, pages);
+  const Sizes size = sizes(h, request, o, division, pages);
   const Layout parts = layout(h, request, o, size, pages);
   parts.require_limits();
   parts.require_budget();
@@ -201,7 +258,7 @@ EncodedField PageTable::build(const AmrHierarchy& h, const BuildRequest& request
   write_table(h, size.table, pages, field);
   field.statistics = statistics(h, o, pages, size);
   add_shader_inputs(h, o, size, field);
-  if (request.needs.draw_boxes) set_draw_tree(field, PageDrawTree(h, o.page_size, pages).tree());
+  if (request.needs.draw_boxes) set_draw_tree(field, PageDrawTree(h, division, pages).tree());
   return field;
 }
 

@@ -1,23 +1,29 @@
-// page_table: one or two table look-ups a region, one filtered fetch a sample and field.
+// page_table: one table look-up a region and level of the table, one filtered fetch a sample and field.
 #include "page_table/page_table_layout.h"
 DEFINE_INT(AMRTEX_PAGE_SIZE)          // cells along the edge of a page, a power of two
 DEFINE_INT(AMRTEX_PAGE_BORDER)        // texels between the lower face of a page and its first value
 DEFINE_INT(AMRTEX_PAGE_EDGE)          // texels along the edge of a stored page
 DEFINE_INT(AMRTEX_PAGE_NODES)         // 1 where texels are vertices, 0 where they are cells
 DEFINE_INT(AMRTEX_PAGE_CONSTANTS)     // 1 where constant pages exist, else 0
-DEFINE_INT(AMRTEX_PAGE_TABLE_LEVELS)  // 1 or 2
+DEFINE_INT(AMRTEX_PAGE_TABLE_LEVELS)  // look-ups that find a page, at most
+DEFINE_INT(AMRTEX_PAGE_TABLE_TREE)    // 1 where sub-tables form a tree in a buffer, 0 where the second level is a texture
+DEFINE_INT(AMRTEX_PAGE_ENTRY_WORDS)   // channels of an entry, 1 or 2
 DEFINE_INT(AMRTEX_POOL_X)             // texels of the pool along x
 DEFINE_INT(AMRTEX_POOL_Y)             // along y
 DEFINE_INT(AMRTEX_POOL_Z)             // along z
 
 INTEGER_TEXTURE(tex_page_table)
-#if AMRTEX_CPP || AMRTEX_PAGE_TABLE_LEVELS == 2
+#if AMRTEX_CPP || AMRTEX_PAGE_TABLE_TREE
+BUFFER(uint, page_nodes, page_nodes_block)     // entries of sub-tables, x fastest
+BUFFER(uvec2, page_stages, page_stages_block)  // a level of the tree below the first: width of an entry, finest cells; entries along an edge
+#endif
+#if AMRTEX_CPP || (AMRTEX_PAGE_TABLE_LEVELS == 2 && !AMRTEX_PAGE_TABLE_TREE)
 INTEGER_TEXTURE(tex_page_subtables)
 UNIFORM(ivec3, u_subtable)        // x: entries along an edge; y: width of an entry, finest cells; z: unused
 UNIFORM(ivec3, u_subtable_shift)  // log2 of sub-tables along x and y of their texture
 #endif
 VALUE_TEXTURES(tex_pages, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)
-UNIFORM(ivec3, u_page_table)     // x: width of a table entry, finest cells
+UNIFORM(ivec3, u_page_table)     // x: width of an entry of the first level, finest cells
 UNIFORM(ivec3, u_pool_shift)     // log2 of pages along x and y of the pool
 #if AMRTEX_CPP || AMRTEX_VALIDITY
 BUFFER(uint, page_validity, page_validity_block)  // one bit a cell, each field of each page from a new word
@@ -40,23 +46,53 @@ vec2r fetch_range(IN(Region) r, IN(int) field) {
 }
 #endif
 
+#if AMRTEX_CPP || AMRTEX_PAGE_TABLE_TREE
+// From an entry of the first level, of `width` from `corner` (finest), down to the one that is no sub-table.
+void page_descend(IN(ivec3) cell, INOUT(uvec4) entry, INOUT(ivec3) corner, INOUT(int) width) {
+  int stage = 0;
+  if (page_entry_kind(entry.x) == AMRTEX_PAGE_SUBTABLE) {
+    do {
+      uvec2 below = page_stages[stage];
+      int edge = int(below.y);
+      width = int(below.x);
+      ivec3 s = divide_by_width(cell - corner, width);
+      corner += s * width;
+      int i = AMRTEX_PAGE_ENTRY_WORDS * (page_entry_index(entry.x) * AMRTEX_PAGE_NODE_UNIT + s.x + edge * (s.y + edge * s.z));
+      entry.x = page_nodes[i];
+      if (AMRTEX_PAGE_ENTRY_WORDS > 1) entry.y = page_nodes[i + 1];
+      stage += 1;
+    } while (page_entry_kind(entry.x) == AMRTEX_PAGE_SUBTABLE && stage < AMRTEX_PAGE_TABLE_LEVELS - 1);
+  }
+}
+#endif
+
 bool locate(IN(Position) p, OUT(Region) r) {
   ivec3 t = divide_by_width(p.cell, u_page_table.x);
   uvec4 entry = texelFetch(tex_page_table, t, 0);
-  int kind = page_entry_kind(entry.x);
-#if AMRTEX_CPP || AMRTEX_PAGE_TABLE_LEVELS == 2
-  if (AMRTEX_PAGE_TABLE_LEVELS == 2 && kind == AMRTEX_PAGE_SUBTABLE) {
+#if AMRTEX_CPP || (AMRTEX_PAGE_TABLE_LEVELS == 2 && !AMRTEX_PAGE_TABLE_TREE)
+  if (AMRTEX_PAGE_TABLE_LEVELS == 2 && AMRTEX_PAGE_TABLE_TREE == 0 && page_entry_kind(entry.x) == AMRTEX_PAGE_SUBTABLE) {
     ivec3 s = divide_by_width(p.cell - t * u_page_table.x, u_subtable.y);
     entry = texelFetch(tex_page_subtables, page_pool_position(page_entry_index(entry.x), u_subtable_shift) * u_subtable.x + s, 0);
-    kind = page_entry_kind(entry.x);
   }
 #endif
+#if AMRTEX_CPP || AMRTEX_PAGE_TABLE_TREE
+  ivec3 corner = t * u_page_table.x;
+  int entry_width = u_page_table.x;
+  if (AMRTEX_PAGE_TABLE_TREE != 0) page_descend(p.cell, entry, corner, entry_width);
+#endif
+  int kind = page_entry_kind(entry.x);
   r.level = page_entry_level(entry.x);
   r.width = level_width(r.level);
-  int page_width = AMRTEX_PAGE_SIZE * r.width;
-  if (AMRTEX_POWER_OF_TWO != 0) r.lower = p.cell & ivec3(-page_width);
-  else r.lower = divide_by_width(p.cell, page_width) * page_width;
-  r.upper = min(r.lower + ivec3(page_width), u_domain_cells);
+  // in cells of its level: a page that overhangs the domain may pass 31 bits of finest cells
+  ivec3 first = divide_by_width(p.cell, r.width) & ivec3(-AMRTEX_PAGE_SIZE);
+  r.lower = first * r.width;
+  r.upper = min(first + ivec3(AMRTEX_PAGE_SIZE), divide_by_width(u_domain_cells, r.width)) * r.width;
+#if AMRTEX_CPP || AMRTEX_PAGE_TABLE_TREE
+  if (AMRTEX_PAGE_TABLE_TREE != 0 && kind == AMRTEX_PAGE_ABSENT) {  // many pages without mesh are passed as one entry
+    r.lower = min(r.lower, corner);
+    r.upper = max(r.upper, corner + min(ivec3(entry_width), u_domain_cells - corner));
+  }
+#endif
   r.value_range = vec2r(0);
   int index = page_entry_index(entry.x);
   ivec3 texel = page_pool_position(index, u_pool_shift) * AMRTEX_PAGE_EDGE;

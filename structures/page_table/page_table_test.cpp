@@ -210,7 +210,7 @@ TEST(PageTable, EntriesHoldWhatTheLayoutSays) {
   }
 }
 
-TEST(PageTable, ThirteenLevelsTakeTwoTablesAndHoldTheField) {
+TEST(PageTable, ThirteenLevelsTakeATreeOfTablesAndHoldTheField) {
   // 16 * 2^12 = 65536 cells along an axis: one table would have 16384^3 entries
   const AmrHierarchy h(generate_mesh(Json::parse(
       R"({"field": {"type": "sum", "terms": [{"type": "linear", "gradient": [1, 2, 3]}, {"type": "blobs"}]},
@@ -220,13 +220,11 @@ TEST(PageTable, ThirteenLevelsTakeTwoTablesAndHoldTheField) {
   const auto positions = probe_positions(h, 30);
   for (const Filter filter : {Filter::nearest, Filter::linear_page, Filter::linear_vertex}) {
     const EncodedField field = page_field(h, filter, 4, {.storage = Storage::r64f});
-    EXPECT_EQ(field.statistics["table_levels"], 2);
+    EXPECT_GT(field.statistics["table_levels"], 2);
     EXPECT_GT(field.statistics["subtables"].get<int>(), 0);
-    EXPECT_LT(field.memory().total(), std::int64_t{256} << 20) << "where one level passes its cap, two must not";
+    EXPECT_LT(field.find("page_nodes")->bytes(), field.find("tex_pages")->bytes()) << "the table costs less than its pages";
     const Comparison result = compare_double(h, field, positions);
     EXPECT_TRUE(result) << filter_name(filter) << ": " << result;
-    const HostTexture& subtables = *field.find("tex_page_subtables");
-    EXPECT_EQ(subtables.roles.topology + subtables.roles.padding, subtables.bytes());
     const EncodedField floats = page_field(h, filter, 4);
     Context& gl = context(ContextKind::egl);
     const Comparison on_gl = compare(positions, reference_values(h, floats.definition, positions),

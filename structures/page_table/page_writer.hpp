@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "page_partition.hpp"
+#include "page_pool.hpp"
 #include "page_reader.hpp"
+#include "page_table_plan.hpp"
 #include "structures/common/build_tools.hpp"
 
 namespace amrtex::pages {
@@ -102,17 +104,21 @@ inline void write_entry(HostTexture& texture, const Vec3i& texel, const Entry& e
     texture.as<Entry>()[i] = entry;
 }
 
+inline Entry entry_of(const Page& page) { return {red_of(page.kind, page.level, page.index), page.green}; }
+inline Entry pointer_to(std::uint32_t subtable) { return {red_of(AMRTEX_PAGE_SUBTABLE, 0, subtable), 0}; }
+
 /// Writes the entries of one page into `table`, the box of entries (pages of `table_level`)
 /// that stand in the texture from texel `at`.
 inline void write_entries(const AmrHierarchy& h, const Page& page, int table_level, const Box& table, HostTexture& texture,
                           const Vec3i& at) {
   const int r = h.cell_width(page.level) / h.cell_width(table_level);
-  const Entry entry{red_of(page.kind, page.level, page.index), page.green};
+  const Entry entry = entry_of(page);
   for_each_cell(intersection(Box{page.index_in_level, page.index_in_level + Vec3i(1)}.refined(r), table),
                 [&](const Vec3i& i) { write_entry(texture, i - table.lower + at, entry); });
 }
 
-inline void write_table(const AmrHierarchy& h, const TablePlan& plan, const std::vector<Page>& pages, EncodedField& field) {
+/// One level or two.
+inline void write_levels(const AmrHierarchy& h, const TablePlan& plan, const std::vector<Page>& pages, EncodedField& field) {
   HostTexture& top = *field.find("tex_page_table");
   HostTexture* lower = field.find("tex_page_subtables");
   const Box top_box{Vec3i(0), plan.top};
@@ -124,10 +130,41 @@ inline void write_table(const AmrHierarchy& h, const TablePlan& plan, const std:
     }
     const Vec3i owner = page.index_in_level / (h.cell_width(plan.top_level) / h.cell_width(page.level));
     const auto [sub, added] = subtables.try_emplace(top_box.offset(owner), static_cast<std::uint32_t>(subtables.size()));
-    if (added) write_entry(top, owner, {red_of(AMRTEX_PAGE_SUBTABLE, 0, sub->second), 0});
+    if (added) write_entry(top, owner, pointer_to(sub->second));
     const Box entries = Box{owner, owner + Vec3i(1)}.refined(plan.sub_edge);
     write_entries(h, page, plan.finest_level, entries, *lower, plan.sub_layout.position(sub->second));
   }
+}
+
+/// A tree of tables. Where no page lies entries stay zero: absent, of level 0.
+inline void write_tree(const TablePlan& plan, const std::vector<Page>& pages, EncodedField& field) {
+  const TableTree& tree = *plan.tree;
+  HostTexture& top = *field.find("tex_page_table");
+  HostTexture* nodes = field.find("page_nodes");
+  const auto write = [&](std::size_t stage, std::int64_t first, const Box& table, const Vec3i& at, const Entry& entry) {
+    if (stage == 0) return write_entry(top, at, entry);
+    std::uint32_t* words =
+        nodes->as<std::uint32_t>() + plan.entry_words() * (first + static_cast<std::int64_t>(table.offset(at)));
+    words[0] = entry.red;
+    if (plan.green) words[1] = entry.green;
+  };
+  for (const Page& page : pages) {
+    const EntryPlace place = tree.place(page);
+    for_each_cell(place.entries, [&](const Vec3i& at) { write(place.stage, place.first, place.table, at, entry_of(page)); });
+  }
+  tree.for_each_subtable([&](std::size_t stage, const Vec3i& at, std::uint32_t subtable) {
+    const auto [first, table] = tree.table_of(stage, at);
+    write(stage, first, table, at, pointer_to(subtable));
+  });
+  HostTexture* stages = field.find("page_stages");
+  for (std::size_t i = 1; i < tree.stages().size(); ++i) {
+    stages->as<std::uint32_t>()[2 * (i - 1)] = static_cast<std::uint32_t>(tree.stages()[i].width);
+    stages->as<std::uint32_t>()[2 * (i - 1) + 1] = static_cast<std::uint32_t>(tree.stages()[i].edge);
+  }
+}
+
+inline void write_table(const AmrHierarchy& h, const TablePlan& plan, const std::vector<Page>& pages, EncodedField& field) {
+  plan.tree ? write_tree(plan, pages, field) : write_levels(h, plan, pages, field);
 }
 
 }  // namespace amrtex::pages

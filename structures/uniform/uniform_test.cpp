@@ -7,6 +7,7 @@
 #include "structures/common/build_tools.hpp"
 #include "structures/uniform/uniform_layout.h"
 #include "tests/leave_out_cases.hpp"
+#include "tests/test_meshes.hpp"
 
 namespace amrtex {
 namespace {
@@ -212,6 +213,18 @@ TEST(Uniform, NamesTheLimitThatItWouldPass) {
   } catch (const BudgetError& e) {
     EXPECT_THAT(e.what(), AllOf(HasSubstr("1048576 bytes"), HasSubstr(std::to_string(4 * 128 * 128 * 128 + 4 * 64))));
   }
+  // 1024^3 cells of 4 bytes, for which nothing is made
+  const AmrHierarchy large = MeshBuilder(Vec3i(16), std::vector<int>(6, 2)).root(waves).hierarchy();
+  request.memory_limit = std::numeric_limits<std::int64_t>::max();
+  request.context.max_texture_bytes = std::int64_t{1} << 31;
+  const std::int64_t before = peak_bytes();
+  try {
+    find_encoding("uniform").build(large, request);
+    ADD_FAILURE();
+  } catch (const UnsupportedError& e) {
+    EXPECT_THAT(e.what(), AllOf(HasSubstr("1024 x 1024 x 1024 texels (4294967296 bytes)"), HasSubstr("and 2147483648 bytes")));
+  }
+  EXPECT_LE(peak_bytes() - before, 16 << 20);
   // (4 * 2^24)^3 cells of 4 bytes: 2^80, more than 64 bits count
   const AmrHierarchy deep = MeshBuilder(Vec3i(4), std::vector<int>(24, 2)).root(waves).hierarchy();
   try {

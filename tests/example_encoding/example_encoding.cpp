@@ -101,7 +101,7 @@ Plan ExampleEncoding::plan(const AmrHierarchy& h, const BuildRequest& request, c
     throw UnsupportedError(
         fmt::format("encoding example_encoding: {} bricks; an entry of the table numbers {}", p.count(), kMostBricks));
   p.fields = request.field_count();
-  p.border = request.needs.filter != Filter::nearest || request.needs.keeps_border() ? 1 : 0;
+  p.border = interpolates(request.needs.filter) || request.needs.keeps_border() ? 1 : 0;
   p.validity = any_missing(h, request);
   const std::int64_t wanted = std::max<std::int64_t>(p.count(), 1) * parameters.at("table_factor").get<int>();
   p.entries = static_cast<std::int64_t>(std::bit_ceil(static_cast<std::uint64_t>(wanted)));

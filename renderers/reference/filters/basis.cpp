@@ -1,4 +1,5 @@
 // Filter `basis`: the mean of the leaves' values, weighted by hats one cell wide.
+#include <cmath>
 #include <limits>
 
 #include "renderers/reference/cell_cache.hpp"
@@ -68,11 +69,17 @@ class BasisPieces final : public FilterPieces {
     PieceFunction f;
     f.lower = std::numeric_limits<double>::infinity();
     f.upper = -f.lower;
+    f.base = piece_.empty() ? 0 : piece_.front().base;
+    f.denominator = {};
     for (const Cell& cell : piece_) {
       const double width = field().width(cell.level);
       const Vec3d lower = (Vec3d(cell.cell) + 0.5) * width;
-      f.numerator += front.along(cell.numerator, lower, width, from, to);
-      f.denominator += front.along(cell.denominator, lower, width, from, to);
+      Cubic weights = front.rise_along(cell.denominator, lower, width, from, to);
+      weights.c[0] += cell.denominator.coefficients[0];
+      f.denominator += weights;
+      f.numerator += front.rise_along(cell.numerator, lower, width, from, to);
+      f.numerator.c[0] += cell.numerator.coefficients[0];
+      if (cell.base != f.base) f.numerator += weights *= cell.base - f.base;
       f.lower = std::min(f.lower, cell.lower);
       f.upper = std::max(f.upper, cell.upper);
     }
@@ -87,21 +94,25 @@ class BasisPieces final : public FilterPieces {
     Vec3i cell{0};
     bool any = false, finer = false;
     Trilinear numerator, denominator;
+    double base = 0;  // of the values in the numerator: one of them
     double lower = 0, upper = 0;
   };
 
   const Cell& find_cell(int level, const Vec3i& cell) {
     Cell& entry = cells_.at(level, cell);
     if (entry.level == level && entry.cell == cell) return entry;
-    const auto basis = field().basis_cell(level, cell);
-    entry = {level, cell, basis.any, basis.finer, Trilinear::through(basis.values), Trilinear::through(basis.weights)};
+    auto basis = field().basis_cell(level, cell);
+    entry = {level, cell, basis.any, basis.finer, {}, Trilinear::through(basis.weights), 0, 0, 0};
     entry.lower = std::numeric_limits<double>::infinity();
     entry.upper = -entry.lower;
     for (std::size_t k = 0; k < 8; ++k) {
       if (basis.weights[k] == 0) continue;
+      if (std::isinf(entry.lower)) entry.base = basis.values[k];
       entry.lower = std::min(entry.lower, basis.values[k]);
       entry.upper = std::max(entry.upper, basis.values[k]);
+      basis.values[k] -= entry.base;
     }
+    entry.numerator = Trilinear::through(basis.values);
     return entry;
   }
 

@@ -112,8 +112,8 @@ class VertexPieces final : public FilterPieces {
   PieceFunction function(const RayFront& front, double from, double to) const override {
     const double width = field().width(cell_->level);
     PieceFunction f;
-    f.denominator.c[0] = 1;
-    f.numerator = front.along(cell_->f, Vec3d(cell_->cell) * width, width, from, to);
+    f.base = cell_->f.coefficients[0];
+    f.numerator = front.rise_along(cell_->f, Vec3d(cell_->cell) * width, width, from, to);
     f.lower = cell_->lower;
     f.upper = cell_->upper;
     return f;

@@ -24,8 +24,7 @@ class NearestPieces final : public FilterPieces {
   bool locate(RayFront& front) override { return front.enter_leaf(); }
   PieceFunction function(const RayFront& front, double, double) const override {
     PieceFunction f;
-    f.denominator.c[0] = 1;
-    f.numerator.c[0] = f.lower = f.upper = front.leaf().value;
+    f.base = f.lower = f.upper = front.leaf().value;
     return f;
   }
 };
