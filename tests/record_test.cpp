@@ -1,5 +1,8 @@
 #include "bench/records/record.hpp"
 
+#include <fcntl.h>
+#include <zlib.h>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -223,86 +226,172 @@ TEST(ConfigurationHash, RefusesWhatJsonCannotHold) {
   EXPECT_THROW(configuration_hash({{"x", {1.0, INFINITY}}}), Error);
 }
 
-TEST_F(RecordFolder, RoundTripKeepsOrderAndEveryBit) {
+/// A record of a point that no other test has.
+Json record_of(const std::string& configuration, double build_seconds = 0.5, int repetition = 0) {
   Json record = good_record();
-  record["build_seconds"] = 0.1 + 0.2;
-  EXPECT_FALSE(has_record(folder_, "abc"));
-  EXPECT_TRUE(write_record(folder_, "abc", record, false));
-  EXPECT_TRUE(has_record(folder_, "abc"));
-  EXPECT_EQ(read_record(record_path(folder_, "abc")).dump(), record.dump());
+  record["configuration"] = configuration;
+  record["build_seconds"] = build_seconds;
+  record["repetition"] = repetition;
+  return record;
 }
 
-TEST_F(RecordFolder, NeverOverwritesUnlessForced) {
-  const Json first = good_record();
-  Json second = first;
-  second["build_seconds"] = 9;
-  EXPECT_TRUE(write_record(folder_, "abc", first, false));
-  EXPECT_FALSE(write_record(folder_, "abc", second, false));
-  EXPECT_EQ(read_record(record_path(folder_, "abc"))["build_seconds"], 0.5);
-  EXPECT_TRUE(write_record(folder_, "abc", second, true));
-  EXPECT_EQ(read_record(record_path(folder_, "abc"))["build_seconds"], 9);
-  EXPECT_EQ(files(), 1u);
+std::string text_of_file(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+void write_text(const fs::path& path, const std::string& text) {
+  fs::create_directories(path.parent_path());
+  std::ofstream(path, std::ios::binary) << text;
+}
+
+std::string message_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "no error";
+}
+
+TEST_F(RecordFolder, RoundTripKeepsOrderAndEveryBit) {
+  const Json record = record_of("a", 0.1 + 0.2);
+  RecordFile(folder_).append(record);
+  EXPECT_EQ(load_records(folder_).at(0).dump(), record.dump());
+}
+
+TEST_F(RecordFolder, TheLastRecordOfAPointStandsForIt) {
+  {
+    RecordFile file(folder_);
+    file.append(record_of("a", 1));
+    file.append(record_of("b", 2));
+    file.append(record_of("a", 3));
+  }
+  const std::vector<Json> records = load_records(folder_);
+  ASSERT_EQ(records.size(), 2u);
+  EXPECT_EQ(records[0]["build_seconds"], 3);
+  EXPECT_EQ(records[1]["build_seconds"], 2);
+  RecordFile again(folder_);
+  ASSERT_NE(again.find(key_of(record_of("a"))), nullptr);
+  EXPECT_EQ(again.find(key_of(record_of("a")))->at("build_seconds"), 3);
+  EXPECT_EQ(again.find(key_of(record_of("c"))), nullptr);
+}
+
+TEST_F(RecordFolder, RepetitionsAndContextsStandBesideEachOther) {
+  Json elsewhere = record_of("a", 3);
+  elsewhere["context"]["renderer"] = "another";
+  RecordFile file(folder_);
+  file.append(record_of("a", 1, 0));
+  file.append(record_of("a", 2, 1));
+  file.append(elsewhere);
+  EXPECT_EQ(file.records().size(), 3u);
 }
 
 TEST_F(RecordFolder, WritesNothingThatIsNotValid) {
   Json record = good_record();
   record["status"] = "perhaps";
-  EXPECT_THROW(write_record(folder_, "abc", record, false), Error);
-  EXPECT_FALSE(fs::exists(folder_ / "records"));
+  RecordFile file(folder_);
+  EXPECT_THROW(file.append(record), Error);
+  EXPECT_EQ(text_of_file(folder_ / "records.jsonl"), "");
 }
 
-// Writers that race, as two runs into one folder would: exactly one wins, the file is
-// one writer's whole text, and no temporary file stays.
-TEST_F(RecordFolder, OfRacingWritersOneWins) {
-  fs::create_directories(folder_ / "records");
-  std::vector<pid_t> children;
-  for (int writer = 0; writer < 8; ++writer) {
-    const pid_t child = ::fork();
-    ASSERT_GE(child, 0);
-    if (child == 0) {
-      Json record = good_record();
-      record["build_seconds"] = writer;
-      record["experiment"] = std::string(100000, static_cast<char>('a' + writer));
-      ::_exit(write_record(folder_, "abc", record, false) ? 1 : 0);
+// A process that is killed while it writes leaves the beginning of a line: for every length of it the records before are there, and the run
+// that goes on cuts it off.
+TEST_F(RecordFolder, AFileCutAtAnyByteLosesItsLastRecordAlone) {
+  const std::string first = record_line(record_of("a")) + "\n", second = record_line(record_of("b")) + "\n";
+  const fs::path file = folder_ / "records.jsonl";
+  for (std::size_t kept = 0; kept < second.size(); ++kept) {
+    write_text(file, first + second.substr(0, kept));
+    ASSERT_EQ(load_records(folder_).size(), 1u) << kept;
+    if (kept % 97 != 0) continue;
+    {
+      RecordFile open(folder_);
+      EXPECT_EQ(open.warnings().size(), kept > 0 ? 1u : 0u);
+      EXPECT_EQ(text_of_file(file), first);
+      open.append(record_of("b"));
     }
-    children.push_back(child);
+    ASSERT_EQ(text_of_file(file), first + second) << kept;
   }
-  int winners = 0;
-  for (const pid_t child : children) {
-    int status = 0;
-    ::waitpid(child, &status, 0);
-    winners += WEXITSTATUS(status);
-  }
-  EXPECT_EQ(winners, 1);
-  EXPECT_EQ(files(), 1u);
-  const Json record = read_record(record_path(folder_, "abc"));
-  const auto text = record["experiment"].get<std::string>();
-  EXPECT_EQ(text, std::string(100000, static_cast<char>('a' + record["build_seconds"].get<int>())));
 }
 
-TEST_F(RecordFolder, LoadsAllRecordsAndNoLeftovers) {
-  Json record = good_record();
-  for (const char* hash : {"b", "a", "c"}) {
-    record["experiment"] = hash;
-    write_record(folder_, hash, record, false);
-  }
-  std::ofstream(folder_ / "records" / ".d.123.tmp") << "half a rec";
-  const std::vector<Json> records = load_records(folder_);
-  ASSERT_EQ(records.size(), 3u);
-  EXPECT_EQ(records[0]["experiment"], "a");
-  EXPECT_EQ(records[2]["experiment"], "c");
+TEST_F(RecordFolder, ALineThatDoesNotFitItsChecksumIsToldAndLeftOut) {
+  std::string damaged = record_line(record_of("a"));
+  damaged.replace(damaged.find("0.5"), 3, "0.6");
+  write_text(folder_ / "records.jsonl", damaged + "\n" + record_line(record_of("b")) + "\n");
+  const RecordLines lines = load_record_lines(folder_);
+  EXPECT_EQ(lines.records.size(), 1u);
+  ASSERT_EQ(lines.warnings.size(), 1u);
+  EXPECT_THAT(lines.warnings[0], HasSubstr("records.jsonl:1: does not fit its own checksum"));
 }
 
-TEST_F(RecordFolder, NamesTheBrokenFile) {
-  write_record(folder_, "good", good_record(), false);
-  std::ofstream(folder_ / "records" / "broken.json") << R"({"schema": "amrtex-record/2", )";
-  try {
-    load_records(folder_);
-    FAIL() << "a broken record was accepted";
-  } catch (const Error& e) {
-    EXPECT_THAT(e.what(), HasSubstr("broken.json"));
-  }
+TEST_F(RecordFolder, ANewerSchemaIsRefused) {
+  Json record = record_of("a");
+  record["schema"] = "amrtex-record/3";
+  write_text(folder_ / "records.jsonl", record_line(record) + "\n");
+  EXPECT_THAT(message_of([&] { load_records(folder_); }), HasSubstr("'amrtex-record/3'; accepted: amrtex-record/2"));
+  EXPECT_THAT(message_of([&] { RecordFile file(folder_); }), HasSubstr("amrtex-record/3"));
 }
+
+TEST_F(RecordFolder, CommittedRecordsAreCompressed) {
+  fs::create_directories(folder_);
+  const std::string text = record_line(record_of("a")) + "\n";
+  const gzFile file = ::gzopen((folder_ / "records.jsonl.gz").c_str(), "wb");
+  ::gzwrite(file, text.data(), static_cast<unsigned>(text.size()));
+  ::gzclose(file);
+  EXPECT_EQ(load_records(folder_).at(0), record_of("a"));
+}
+
+TEST_F(RecordFolder, OneRunAloneHasAFolder) {
+  const RecordFile first(folder_);
+  EXPECT_THAT(message_of([&] { RecordFile second(folder_); }), HasSubstr("another run measures into it"));
+}
+
+TEST_F(RecordFolder, ADeadProcessHoldsNoFolder) {
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    RecordFile file(folder_);
+    file.append(record_of("a"));
+    ::raise(SIGKILL);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFSIGNALED(status));
+  EXPECT_EQ(RecordFile(folder_).records().size(), 1u);
+}
+
+TEST_F(RecordFolder, AFolderThatVanishesEndsTheRun) {
+  RecordFile file(folder_);
+  fs::remove_all(folder_);
+  EXPECT_THROW(file.append(record_of("a")), OutputError);
+}
+
+TEST_F(RecordFolder, AFolderThatCannotBeWrittenIsAnError) {
+  std::ofstream(folder_) << "a file in the way";
+  EXPECT_THROW(RecordFile file(folder_), OutputError);
+}
+
+// /dev/full takes no byte.
+TEST_F(RecordFolder, AFullDiskLeavesNoPartOfALine) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "/dev/full is missing";
+  const int full = ::open("/dev/full", O_WRONLY | O_CLOEXEC);
+  EXPECT_EQ(write_all(full, "text"), ENOSPC);
+  ::close(full);
+}
+
+TEST_F(RecordFolder, AFolderWithoutRecordsIsAnError) { EXPECT_THROW(load_records(folder_), Error); }
+
+TEST_F(RecordFolder, WholeFilesReplaceOthersAndLeaveNothingBeside) {
+  write_text(folder_ / "table.md", "old");
+  write_text(folder_ / ".unfinished-abcdef", "half");
+  write_atomically(folder_ / "table.md", "new");
+  EXPECT_EQ(text_of_file(folder_ / "table.md"), "new");
+  remove_unfinished_files(folder_);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
+  EXPECT_THROW(write_atomically(folder_ / "absent" / "table.md", "new"), OutputError);
+}
+
+// ---- files of older programs
 
 /// As schema 1 had it: without the keys that came later.
 Json first_record() {
@@ -312,11 +401,6 @@ Json first_record() {
     record.erase(key);
   for (const char* key : {"reference_error", "limited_by_reference", "within_tolerance_seen"}) record["error"].erase(key);
   return record;
-}
-
-void write_text(const fs::path& path, const std::string& text) {
-  fs::create_directories(path.parent_path());
-  std::ofstream(path) << text;
 }
 
 TEST_F(RecordFolder, RecordsOfTheFirstSchemaAreReadWithNullForWhatCameLater) {
@@ -335,30 +419,15 @@ TEST_F(RecordFolder, RecordsOfTheFirstSchemaAreReadWithNullForWhatCameLater) {
   EXPECT_THROW(load_records(folder_), Error) << "what the first schema had is still asked for";
 }
 
-TEST_F(RecordFolder, TellsWhetherRecordsOfTheFirstSchemaAreThere) {
-  EXPECT_FALSE(record_of_first_schema(folder_)) << "no folder";
-  write_record(folder_, "new", good_record(), false);
-  write_text(folder_ / "records" / "broken.json", "{");
-  EXPECT_FALSE(record_of_first_schema(folder_));
+TEST_F(RecordFolder, NamesTheBrokenFile) {
+  write_text(folder_ / "records" / "good.json", good_record().dump());
+  write_text(folder_ / "records" / "broken.json", R"({"schema": "amrtex-record/2", )");
+  EXPECT_THAT(message_of([&] { load_records(folder_); }), HasSubstr("broken.json"));
+}
+
+TEST_F(RecordFolder, ARunDoesNotGoOnFromThem) {
   write_text(folder_ / "records" / "old.json", first_record().dump());
-  EXPECT_EQ(record_of_first_schema(folder_), folder_ / "records" / "old.json");
-}
-
-TEST_F(RecordFolder, ARecordBelongsToOneImplementation) {
-  Json record = good_record();
-  record["implementation"] = "ab";
-  EXPECT_FALSE(has_record_of(folder_, "abc", "ab"));
-  write_record(folder_, "abc", record, false);
-  EXPECT_TRUE(has_record_of(folder_, "abc", "ab"));
-  EXPECT_FALSE(has_record_of(folder_, "abc", "cd"));
-}
-
-TEST_F(RecordFolder, AFolderWithoutRecordsIsAnError) { EXPECT_THROW(load_records(folder_), Error); }
-
-TEST_F(RecordFolder, AFolderThatCannotBeWrittenIsAnError) {
-  fs::create_directories(folder_);
-  std::ofstream(folder_ / "records") << "a file in the way";
-  EXPECT_THROW(write_record(folder_, "abc", good_record(), false), Error);
+  EXPECT_THAT(message_of([&] { RecordFile file(folder_); }), HasSubstr("records/old.json is of an older form"));
 }
 
 }  // namespace

@@ -445,11 +445,11 @@ Measure measure_by_running(const Experiment& scene, const AdviceRequest& request
     RunOptions run = options;
     run.wanted = [&](const BuildPoint& b, const RenderPoint& r) { return wanted.contains(key_of({b, r.settings})); };
     run_experiment(experiment, run);
+    std::map<std::string, Json> by_configuration;
+    for (Json& record : load_records(options.folder)) by_configuration[record.at("configuration")] = std::move(record);
     std::vector<Json> records;
-    for (std::size_t i = 0; i < candidates.size(); ++i) {
-      const Json configuration = point_configuration(experiment, candidates[i].build, drawn[i], data);
-      records.push_back(read_record(record_path(options.folder, configuration_hash(configuration))));
-    }
+    for (std::size_t i = 0; i < candidates.size(); ++i)
+      records.push_back(by_configuration.at(configuration_hash(point_configuration(experiment, candidates[i].build, drawn[i], data))));
     return records;
   };
 }

@@ -3,264 +3,235 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <random>
-#include <vector>
+#include <utility>
 
-#include "bench/measure/change_time.hpp"
-#include "bench/measure/description.hpp"
 #include "bench/measure/environment.hpp"
-#include "bench/measure/frame_times.hpp"
-#include "bench/measure/judgement.hpp"
-#include "bench/measure/left_out_time.hpp"
-#include "bench/measure/scene_data.hpp"
-#include "bench/measure/shader_cache.hpp"
+#include "bench/measure/local_group.hpp"
+#include "bench/measure/process_group.hpp"
 #include "bench/measure/stopwatch.hpp"
 #include "bench/records/record.hpp"
-#include "renderers/bindings/scene_needs.hpp"
-#include "renderers/consumers/make_consumer.hpp"
+#include "bench/records/record_file.hpp"
+#include "structures/mesh/whole_file.hpp"
 
 namespace amrtex {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kChanges = 20;
-
-struct Failure {
-  Status status;
-  std::string reason;
-  std::int64_t needed_bytes = 0;  ///< of what is over the budget, where they are known
+/// Points of one structure.
+struct Group {
+  std::size_t build = 0;
+  std::vector<PlannedPoint> points;
 };
 
-/// Why a point could not be measured, from the exception that says so.
-Failure failure_of(const std::exception& error) {
-  if (dynamic_cast<const UnsupportedError*>(&error) != nullptr) return {Status::unsupported, error.what()};
-  if (const auto* budget = dynamic_cast<const BudgetError*>(&error))
-    return {Status::over_budget, error.what(), budget->needed_bytes()};
-  return {Status::failed, error.what()};
+/// One structure after the other, of one encoding after the other, each encoding's own in the order of the seed: what drifts with time must
+/// favour no encoding because of its place in the file.
+std::vector<Group> interleaved(const Experiment& experiment, std::vector<Group> groups, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  const auto shuffle = [&](auto& list) {
+    for (std::size_t i = list.size(); i > 1; --i) std::swap(list[i - 1], list[random() % i]);
+  };
+  shuffle(groups);
+  std::map<std::string, std::vector<Group>> by_encoding;
+  for (Group& group : groups) by_encoding[experiment.builds[group.build].encoding].push_back(std::move(group));
+  std::vector<Group> order;
+  while (!by_encoding.empty()) {
+    std::vector<std::string> encodings;
+    for (const auto& [name, list] : by_encoding) encodings.push_back(name);
+    shuffle(encodings);
+    for (const std::string& name : encodings) {
+      std::vector<Group>& list = by_encoding[name];
+      order.push_back(std::move(list.back()));
+      list.pop_back();
+      if (list.empty()) by_encoding.erase(name);
+    }
+  }
+  return order;
 }
 
-/// Records of schema 1 are named by less than what decides a point, so a run could take one for another.
-void refuse_first_schema(const fs::path& folder) {
-  if (const auto record = record_of_first_schema(folder))
-    throw UsageError(fmt::format(
-        "output folder {}: {} is of schema {}, which a run does not go on from; accepted: another folder for --out, or this one "
-        "without its folder `records` (`amrtex report` still makes tables of them)",
-        folder.string(), record->filename().string(), kFirstSchema));
-}
-
-/// The data set that is measured at the moment, with the baseline of its points.
-struct Current {
-  Current(const Experiment& experiment, std::size_t dataset, Context& context)
-      : data(experiment, dataset), baseline(experiment, dataset, data.mesh(), context) {}
-
-  LoadedData data;
-  Baseline baseline;
-};
-
-class Runner {
+/// What becomes of records: which points have one, and where new ones go.
+class Ledger {
  public:
-  Runner(const Experiment& experiment, const RunOptions& options)
-      : experiment_(experiment),
-        options_(options),
-        conditions_{options.shader_cache.empty() ? Json() : Json(use_shader_cache(options.shader_cache)), implementation_hash()},
-        context_(make_context(parse_context_kind(experiment.context))) {}
-
-  RunSummary run() {
-    for (const BuildPoint* build : measuring_order()) run_build(*build);
-    return summary_;
+  Ledger(const Experiment& experiment, const RunOptions& options)
+      : experiment_(experiment), options_(options), implementation_(implementation_hash()), file_(options.folder) {
+    for (const char* folder : {"", "pictures", "references"}) remove_unfinished_files(options.folder / folder);
+    for (const Json& record : file_.records()) latest_[{configuration(record), record.value("repetition", 0)}] = record;
   }
 
- private:
-  /// The builds of each data set, shuffled by the seed: what drifts with time must not favour
-  /// an encoding because of its place in the file.
-  std::vector<const BuildPoint*> measuring_order() const {
-    std::vector<const BuildPoint*> order;
-    for (const BuildPoint& build : experiment_.builds) order.push_back(&build);
-    std::mt19937_64 random(experiment_.seed);
-    for (std::size_t i = order.size(); i > 1; --i) {
-      const std::size_t j = random() % i;
-      if (order[i - 1]->dataset == order[j]->dataset) std::swap(order[i - 1], order[j]);
-    }
-    return order;
+  const std::vector<std::string>& warnings() const { return file_.warnings(); }
+  RunSummary& summary() { return summary_; }
+
+  /// Is the point's record there, drawn by this program's shaders and builders? Counts it then.
+  bool keeps(const PlannedPoint& point, int repetition) {
+    const auto found = latest_.find({point.configuration, repetition});
+    if (found == latest_.end() || options_.force) return false;
+    const Json& record = found->second;
+    if (!options_.keep_old && record.at("implementation") != implementation_) return false;
+    const bool failed = record.at("status") == status_name(Status::failed);
+    if (failed && options_.retry_failed) return false;
+    ++(failed ? summary_.failed : summary_.kept);
+    return true;
   }
 
-  void load(std::size_t dataset) {
-    if (current_ && data().dataset() == dataset) return;
-    current_.reset();
-    current_.emplace(experiment_, dataset, *context_);
-  }
-
-  LoadedData& data() { return current_->data; }
-  const AmrHierarchy& mesh() const { return current_->data.mesh(); }
-
-  /// Is the point's record there, drawn by this program's shaders and builders?
-  bool is_kept(const std::string& hash) const {
-    if (options_.force) return false;
-    return options_.keep_old ? has_record(options_.folder, hash)
-                             : has_record_of(options_.folder, hash, conditions_.implementation);
-  }
-
-  void run_build(const BuildPoint& build) {
-    load(build.dataset);
-    std::vector<const RenderPoint*> open;
-    for (const RenderPoint& render : experiment_.renders) {
-      if (options_.wanted && !options_.wanted(build, render)) continue;
-      if (is_kept(data().point_hash(build, render)))
-        ++summary_.kept;
-      else
-        open.push_back(&render);
-    }
-    // a structure holds what its scenes need and nothing else, so each need has its own build
-    while (!open.empty()) {
-      const auto differ = std::stable_partition(open.begin(), open.end(),
-                                                [&](const RenderPoint* r) { return equal_needs(build, *r, *open.front()); });
-      measure_all(build, {open.begin(), differ});
-      open.erase(open.begin(), differ);
-    }
-  }
-
-  bool equal_needs(const BuildPoint& build, const RenderPoint& a, const RenderPoint& b) const {
-    const Scene first = scene_of(experiment_, a);
-    const Scene second = scene_of(experiment_, b);
-    return scene_needs(first, build.filter, build.filtering) == scene_needs(second, build.filter, build.filtering) &&
-           more_fields(mesh(), first) == more_fields(mesh(), second);
-  }
-
-  /// Render points of equal needs.
-  void measure_all(const BuildPoint& build, const std::vector<const RenderPoint*>& renders) {
-    std::unique_ptr<Built> built;
-    try {
-      built = build_structure(experiment_, build, mesh(), scene_of(experiment_, *renders.front()), *context_);
-      if (experiment_.explain_left_out)
-        time_left_out(find_encoding(build.encoding), mesh(), built->structure.request, built->structure.field);
-    } catch (const UsageError&) {
-      throw;  // a bad parameter concerns the whole experiment
-    } catch (const std::exception& error) {
-      for (const RenderPoint* render : renders) record_failure(build, *render, failure_of(error));
-      return;
-    }
-    for (const RenderPoint* render : renders) {
-      options_.progress(fmt::format("{} {} {} {}", build.encoding, build.parameters.dump(), filter_name(build.filter),
-                                    render_json(*render).dump()));
-      try {
-        measure(build, *built, *render);
-      } catch (const UsageError&) {
-        throw;
-      } catch (const std::exception& error) {
-        record_failure(build, *render, failure_of(error));
-      }
-    }
-  }
-
-  void measure(const BuildPoint& build, Built& built, const RenderPoint& render) {
-    const Scene scene = scene_of(experiment_, render);
-    const Stopwatch first;
-    const auto consumer = make_consumer(*context_, mesh(), built.structure, scene);
-    consumer->draw();
-    const double first_frame_ms = first.seconds() * 1000;
-    const Picture picture = consumer->read();
-
-    Json record = blank_record(Status::ok);
-    describe_point(record, experiment_, data(), build, render, context_->info(), conditions_);
-    describe_structure(record, built, mesh());
-    record["first_frame_ms"] = first_frame_ms;
-    if (!scene.settings.triangles.empty()) record["triangle_seconds"] = consumer->triangle_seconds();
-    record["image_hash"] = picture_hash(picture);
-    record["context"]["shader_hash"] = consumer->shader_hash();
-    add_warnings(record, scene, *consumer);
-    const std::optional<Judgement> own =
-        add_errors(record, {experiment_, data(), built.structure, *context_, scene, picture, options_.folder / "references"});
-    if (!add_check(record, experiment_, build, scene.settings, own)) {
-      write(build, render, record);
-      return;  // a wrong picture gets no time
-    }
-    write_png(picture, picture_path(build, render));
-    add_work(record, *consumer);
-    if (render.frames > 0) add_times(record, render, *consumer);
-    if (experiment_.time_change) add_change(record, built, scene);
-    write(build, render, record);
-  }
-
-  void add_warnings(Json& record, const Scene& scene, const Consumer& consumer) const {
-    for (const std::string& text : scene_warnings(mesh(), scene)) warn(record, text);
-    if (scene.settings.slice_target == SliceTarget::rgba8)
-      warn(record, "slices were blended in 8 bits a channel (slice_target rgba8): a historical control");
-    if (!consumer.transfer_exact())
-      warn(record, "the transfer function has more than 16 points: it is drawn from a table of 4096 bins");
-  }
-
-  static void add_work(Json& record, Consumer& consumer) {
-    const WorkCounts work = consumer.count();
-    record["work"] = {{"rays", work.rays},
-                      {"samples", work.samples},
-                      {"regions", work.regions},
-                      {"regions_skipped", work.regions_skipped},
-                      {"passes", work.passes}};
-  }
-
-  void add_times(Json& record, const RenderPoint& render, Consumer& consumer) {
-    const FrameTimes times = time_point(render, consumer, current_->baseline.beside(render), context_->info().software);
-    record["frame"] = times.frame;
-    if (!times.warning.empty()) warn(record, times.warning);
-  }
-
-  void add_change(Json& record, const Built& built, const Scene& scene) {
-    try {
-      const ChangeTimes change = time_changes(*context_, mesh(), built.structure, scene, kChanges);
-      record["change"] = {{"wall_ms", timing_json(change.wall_ms)}, {"bytes", change.bytes}};
-    } catch (const UnsupportedError& error) {
-      record["change"] = nullptr;
-      warn(record, error.what());
-    }
-  }
-
-  void record_failure(const BuildPoint& build, const RenderPoint& render, const Failure& failure) {
-    Json record = blank_record(failure.status, failure.reason);
-    describe_point(record, experiment_, data(), build, render, context_->info(), conditions_);
-    if (failure.needed_bytes > 0) record["needed_bytes"] = failure.needed_bytes;
-    write(build, render, record);
-  }
-
-  void write(const BuildPoint& build, const RenderPoint& render, const Json& record) {
-    const std::string hash = data().point_hash(build, render);
-    const bool outdated = has_record(options_.folder, hash) && !is_kept(hash);
-    write_record(options_.folder, hash, record, options_.force || outdated);
+  void add(const Json& record) {
+    file_.append(record);
+    options_.recorded(record);
     const std::string status = record.at("status");
-    if (status == "ok")
+    if (status == status_name(Status::ok))
       ++summary_.measured;
-    else if (status == "unsupported")
+    else if (status == status_name(Status::unsupported))
       ++summary_.unsupported;
-    else if (status == "over_budget")
+    else if (status == status_name(Status::over_budget))
       ++summary_.over_budget;
     else
       ++summary_.failed;
   }
 
-  fs::path picture_path(const BuildPoint& build, const RenderPoint& render) {
-    fs::create_directories(options_.folder / "pictures");
-    return options_.folder / "pictures" / (data().point_hash(build, render) + ".png");
+ private:
+  static std::string configuration(const Json& record) { return record.value("configuration", std::string()); }
+
+  const Experiment& experiment_;
+  const RunOptions& options_;
+  std::string implementation_;
+  RecordFile file_;
+  std::map<std::pair<std::string, int>, Json> latest_;  ///< of any context: a folder that was copied is gone on from
+  RunSummary summary_;
+};
+
+bool is_wanted(const Experiment& experiment, const RunOptions& options, const PlannedPoint& point) {
+  if (options.wanted && !options.wanted(experiment.builds[point.build], experiment.renders[point.render])) return false;
+  return options.only.empty() || std::any_of(options.only.begin(), options.only.end(), [&](const std::string& beginning) {
+           return point.configuration.starts_with(beginning);
+         });
+}
+
+/// `Measuring`: LocalGroups or ProcessGroups.
+template <class Measuring>
+class Sweep {
+ public:
+  Sweep(const Experiment& experiment, const RunOptions& options, Measuring& measuring)
+      : experiment_(experiment), options_(options), measuring_(measuring), ledger_(experiment, options) {}
+
+  RunSummary run() {
+    for (const std::string& warning : ledger_.warnings()) options_.progress(warning);
+    for (std::size_t dataset = 0; dataset < experiment_.datasets.size(); ++dataset) run_dataset(dataset);
+    RunSummary summary = ledger_.summary();
+    summary.warnings = ledger_.warnings();
+    summary.shares = measuring_.take_shares();
+    summary.seconds = clock_.seconds();
+    return summary;
+  }
+
+ private:
+  void run_dataset(std::size_t dataset) {
+    if (!any_wanted(dataset)) return;
+    std::vector<PlannedPoint> points = measuring_.plan(dataset);
+    std::erase_if(points, [&](const PlannedPoint& p) { return !is_wanted(experiment_, options_, p); });
+    for (int repetition = 0; repetition < options_.repeat; ++repetition) {
+      if constexpr (requires { measuring_.end_process(); })
+        if (repetition > 0) measuring_.end_process();
+      std::vector<Group> open = open_groups(points, repetition);
+      int count = 0;
+      for (const Group& group : open) count += static_cast<int>(group.points.size());
+      options_.planned(count);
+      const std::uint64_t seed = experiment_.seed + static_cast<std::uint64_t>(repetition);
+      for (const Group& group : interleaved(experiment_, std::move(open), seed)) measure(group, repetition);
+    }
+    if constexpr (requires { measuring_.end_process(); }) measuring_.end_process();
+  }
+
+  /// A data set that no wanted point is of need not be read.
+  bool any_wanted(std::size_t dataset) const {
+    for (const BuildPoint& build : experiment_.builds) {
+      if (build.dataset != dataset) continue;
+      if (!options_.wanted) return true;
+      for (const RenderPoint& render : experiment_.renders)
+        if (options_.wanted(build, render)) return true;
+    }
+    return false;
+  }
+
+  std::vector<Group> open_groups(const std::vector<PlannedPoint>& points, int repetition) {
+    std::map<std::pair<std::size_t, int>, Group> groups;
+    for (const PlannedPoint& point : points) {
+      if (ledger_.keeps(point, repetition)) continue;
+      Group& group = groups[{point.build, point.structure}];
+      group.build = point.build;
+      group.points.push_back(point);
+    }
+    std::vector<Group> list;
+    for (auto& [key, group] : groups) list.push_back(std::move(group));
+    return list;
+  }
+
+  void measure(const Group& group, int repetition) {
+    if (options_.time_limit && clock_.seconds() >= *options_.time_limit) {
+      ledger_.summary().left += static_cast<int>(group.points.size());
+      return;
+    }
+    const BuildPoint& build = experiment_.builds[group.build];
+    options_.progress(fmt::format("{} {} {} {}: {} points", build.encoding, build.parameters.dump(), filter_name(build.filter),
+                                  format_name(build.storage), group.points.size()));
+    std::vector<std::size_t> renders;
+    for (const PlannedPoint& point : group.points) renders.push_back(point.render);
+    measuring_.measure(group.build, renders, repetition, [&](const Json& record) { ledger_.add(record); });
   }
 
   const Experiment& experiment_;
   const RunOptions& options_;
-  RunConditions conditions_;  ///< before the context, which finds the folder of shaders when it is made
-  std::unique_ptr<Context> context_;
-  RunSummary summary_;
-  std::optional<Current> current_;
+  Measuring& measuring_;
+  Ledger ledger_;
+  Stopwatch clock_;
 };
+
+/// The experiment as it is measured: records are named by what was really used.
+Experiment settled(const Experiment& experiment, const RunOptions& options) {
+  Experiment result = experiment;
+  if (options.context) result.context = context_kind_name(*options.context);
+  if (options.memory_limit) result.memory_limit = options.memory_limit;
+  return result;
+}
 
 }  // namespace
 
 RunSummary run_experiment(const Experiment& experiment, const RunOptions& options) {
-  std::error_code error;
-  fs::create_directories(options.folder, error);
-  if (error) throw Error(fmt::format("output folder {}: {}", options.folder.string(), error.message()));
-  refuse_first_schema(options.folder);
-  Experiment settled = experiment;  // records are named by what was really used
-  if (options.context) settled.context = context_kind_name(*options.context);
-  if (options.memory_limit) settled.memory_limit = options.memory_limit;
-  return Runner(settled, options).run();
+  const Experiment used = settled(experiment, options);
+  if (options.measuring_process.empty()) {
+    LocalGroups local(used, options);
+    return Sweep(used, options, local).run();
+  }
+  ProcessGroups processes(options);
+  return Sweep(used, options, processes).run();
+}
+
+Json point_settings(const Experiment& experiment, const BuildPoint& build, const RenderPoint& render) {
+  const DatasetSource& source = experiment.datasets[build.dataset];
+  return {{"dataset", {{"name", source.name}, {"field", source.field ? Json(*source.field) : Json()}}},
+          {"encoding", build.encoding},
+          {"build_parameters", build.parameters},
+          {"filter", filter_name(build.filter)},
+          {"storage", format_name(build.storage)},
+          {"filtering", filtering_name(build.filtering)},
+          {"render", render_json(render)}};
+}
+
+std::vector<ListedPoint> list_points(const Experiment& experiment, const RunOptions& options) {
+  const Experiment used = settled(experiment, options);
+  std::map<std::string, std::string> statuses;
+  if (fs::exists(options.folder / "records.jsonl"))
+    for (const Json& record : load_records(options.folder)) statuses[record.value("configuration", "")] = record.at("status");
+  LocalGroups local(used, options);
+  std::vector<ListedPoint> listed;
+  for (std::size_t dataset = 0; dataset < used.datasets.size(); ++dataset)
+    for (const PlannedPoint& p : local.plan(dataset)) {
+      if (!is_wanted(used, options, p)) continue;
+      const auto found = statuses.find(p.configuration);
+      listed.push_back({p.configuration, point_settings(used, used.builds[p.build], used.renders[p.render]),
+                        found == statuses.end() ? "open" : found->second});
+    }
+  return listed;
 }
 
 }  // namespace amrtex

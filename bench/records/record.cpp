@@ -1,19 +1,15 @@
 #include "bench/records/record.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 #include <xxhash.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cmath>
-#include <cstdio>
-#include <fstream>
 #include <system_error>
 
 #include "bench/numbers/statistics.hpp"
+#include "bench/records/record_file.hpp"
 #include "bench/settings/json_file.hpp"
 #include "structures/mesh/error.hpp"
 #include "structures/mesh/quoted.hpp"
@@ -270,52 +266,6 @@ nlohmann::json canonical(const Json& json) {
   return number;
 }
 
-[[noreturn]] void throw_system(const std::filesystem::path& path, std::string_view what) {
-  const std::string why = std::system_category().message(errno);
-  throw Error(fmt::format("{}: {}: {}", path.string(), what, why));
-}
-
-/// Closes the descriptor, and removes the file unless it got its final name.
-class TemporaryFile {
- public:
-  explicit TemporaryFile(std::filesystem::path path) : path_(std::move(path)) {
-    descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-    if (descriptor_ < 0) throw_system(path_, "cannot be written");
-  }
-  ~TemporaryFile() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-    ::unlink(path_.c_str());
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-
-  void write(std::string_view text) {
-    while (!text.empty()) {
-      const ssize_t written = ::write(descriptor_, text.data(), text.size());
-      if (written < 0 && errno == EINTR) continue;
-      if (written < 0) throw_system(path_, "cannot be written");
-      text.remove_prefix(static_cast<std::size_t>(written));
-    }
-    if (::fsync(descriptor_) != 0) throw_system(path_, "cannot be written to disk");
-    if (::close(std::exchange(descriptor_, -1)) != 0) throw_system(path_, "cannot be closed");
-  }
-
-  /// Gives the file its final name; false when `target` exists and may not be replaced.
-  bool publish(const std::filesystem::path& target, bool replace) const {
-    const unsigned flags = replace ? 0 : RENAME_NOREPLACE;
-    if (::renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, target.c_str(), flags) == 0) return true;
-    if (errno == EEXIST) return false;
-    // file systems without RENAME_NOREPLACE: the check of the caller has to do
-    if (errno != EINVAL || std::filesystem::exists(target) || ::rename(path_.c_str(), target.c_str()) != 0)
-      throw_system(target, "cannot be renamed to this name");
-    return true;
-  }
-
- private:
-  std::filesystem::path path_;
-  int descriptor_ = -1;
-};
-
 void check_contents(const Json& record) {
   for (const Rule& rule : kRules) check_rule(record, rule);
   check_status(record);
@@ -335,12 +285,24 @@ void add_later_keys(Json& record) {
   }
 }
 
-/// Makes a rename in `folder` survive a power failure.
-void sync_folder(const std::filesystem::path& folder) {
-  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  ::fsync(descriptor);
-  ::close(descriptor);
+Json read_separate_record(const std::filesystem::path& path) {
+  Json record;
+  try {
+    record = read_json(path);
+  } catch (const UsageError& e) {  // of a file that no user writes
+    throw Error(e.what());
+  }
+  try {
+    if (is_first_schema(record)) {
+      add_later_keys(record);
+      check_contents(record);
+    } else {
+      validate_record(record);
+    }
+    return record;
+  } catch (const std::exception& e) {
+    throw Error(fmt::format("{}: {}", path.string(), e.what()));
+  }
 }
 
 }  // namespace
@@ -424,81 +386,28 @@ std::string configuration_hash(const Json& configuration) {
   return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
 }
 
-std::filesystem::path record_path(const std::filesystem::path& folder, std::string_view hash) {
-  return folder / "records" / (std::string(hash) + ".json");
-}
+std::vector<Json> load_records(const std::filesystem::path& folder) { return load_record_lines(folder).records; }
 
-bool has_record(const std::filesystem::path& folder, std::string_view hash) {
-  return std::filesystem::exists(record_path(folder, hash));
-}
-
-bool has_record_of(const std::filesystem::path& folder, std::string_view hash, std::string_view implementation) {
-  return has_record(folder, hash) && read_record(record_path(folder, hash)).at("implementation") == implementation;
-}
-
-std::optional<std::filesystem::path> record_of_first_schema(const std::filesystem::path& folder) {
-  std::error_code absent;
-  for (const auto& entry : std::filesystem::directory_iterator(folder / "records", absent)) {
-    if (entry.path().extension() != ".json") continue;
-    std::ifstream in(entry.path(), std::ios::binary);
-    if (is_first_schema(Json::parse(in, nullptr, false))) return entry.path();
-  }
-  return std::nullopt;
-}
-
-bool write_record(const std::filesystem::path& folder, std::string_view hash, const Json& record, bool force) {
-  validate_record(record);
-  const std::filesystem::path target = record_path(folder, hash);
-  if (!force && std::filesystem::exists(target)) return false;
-  std::error_code error;
-  std::filesystem::create_directories(target.parent_path(), error);
-  if (error) throw Error(fmt::format("{}: cannot be made: {}", target.parent_path().string(), error.message()));
-  TemporaryFile file(target.parent_path() / fmt::format(".{}.{}.tmp", hash, ::getpid()));
-  file.write(record.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
-  if (!file.publish(target, force)) return false;
-  sync_folder(target.parent_path());
-  return true;
-}
-
-void write_atomically(const std::filesystem::path& target, std::string_view text) {
-  const std::filesystem::path folder = target.has_parent_path() ? target.parent_path() : std::filesystem::path(".");
-  TemporaryFile file(folder / fmt::format(".{}.{}.tmp", target.filename().string(), ::getpid()));
-  file.write(text);
-  file.publish(target, true);
-  sync_folder(folder);
-}
-
-Json read_record(const std::filesystem::path& path) {
-  Json record;
-  try {
-    record = read_json(path);
-  } catch (const UsageError& e) {  // of a file that no user writes
-    throw Error(e.what());
-  }
-  try {
-    if (is_first_schema(record)) {
-      add_later_keys(record);
-      check_contents(record);
-    } else {
-      validate_record(record);
-    }
-    return record;
-  } catch (const std::exception& e) {
-    throw Error(fmt::format("{}: {}", path.string(), e.what()));
-  }
-}
-
-std::vector<Json> load_records(const std::filesystem::path& folder) {
+std::vector<Json> load_separate_records(const std::filesystem::path& folder) {
   const std::filesystem::path records = folder / "records";
   std::error_code error;
   std::vector<std::filesystem::path> paths;
   for (const auto& entry : std::filesystem::directory_iterator(records, error))
     if (entry.path().extension() == ".json") paths.push_back(entry.path());
-  if (error) throw Error(fmt::format("{}: cannot be read: {}", records.string(), error.message()));
+  if (error)
+    throw Error(fmt::format("{}: no records: neither records.jsonl nor records.jsonl.gz is there; accepted: a folder that `amrtex run` wrote",
+                            folder.string()));
   std::sort(paths.begin(), paths.end());
   std::vector<Json> loaded;
-  for (const auto& path : paths) loaded.push_back(read_record(path));
+  for (const auto& path : paths) loaded.push_back(read_separate_record(path));
   return loaded;
+}
+
+std::optional<std::filesystem::path> separate_record(const std::filesystem::path& folder) {
+  std::error_code absent;
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "records", absent))
+    if (entry.path().extension() == ".json") return entry.path();
+  return std::nullopt;
 }
 
 }  // namespace amrtex

@@ -1,5 +1,5 @@
-// One measurement, one JSON file: DIR/records/<configuration>.json, schema `amrtex-record/2`.
-// Absent is null; 0 is a value. Tables are made from records and nothing else. Records of schema 1 are read, never written.
+// One measurement: schema `amrtex-record/2`. Absent is null; 0 is a value. Tables are made from records and nothing else. Records of
+// schema 1 are read, never written. Where they stand: record_file.hpp.
 #pragma once
 
 #include <filesystem>
@@ -42,22 +42,13 @@ void validate_record(const Json& record);
 /// as 1. Throws Error for NaN and infinities, which JSON cannot tell apart from null.
 std::string configuration_hash(const Json& configuration);
 
-std::filesystem::path record_path(const std::filesystem::path& folder, std::string_view hash);
-bool has_record(const std::filesystem::path& folder, std::string_view hash);
-/// Whether the point's record is there and was drawn by this `implementation`. Throws Error naming the file when it is no valid
-/// record.
-bool has_record_of(const std::filesystem::path& folder, std::string_view hash, std::string_view implementation);
-/// A record of schema 1 in the folder, where there is one. What is no JSON is passed over: `load_records` names it.
-std::optional<std::filesystem::path> record_of_first_schema(const std::filesystem::path& folder);
-/// Validates, then writes atomically: temporary name, fsync, rename. A record that
-/// exists stays as it is unless `force`; returns whether this one was written.
-bool write_record(const std::filesystem::path& folder, std::string_view hash, const Json& record, bool force);
-/// Writes under a temporary name beside `target`, fsync, rename; what was there is replaced. Throws Error naming the file.
-void write_atomically(const std::filesystem::path& target, std::string_view text);
-/// One of schema 1 keeps its name of schema and gets null for each key that came later. Throws Error naming the file when it is
-/// no valid record.
-Json read_record(const std::filesystem::path& path);
-/// All records of `folder`, by file name. Throws Error naming the broken file.
+/// Every record of a folder that `amrtex run` wrote, or of committed results (record_file.hpp). Throws Error where there is none.
 std::vector<Json> load_records(const std::filesystem::path& folder);
+
+/// Older programs wrote a file a record: DIR/records/<configuration>.json, of schema 1 and early ones of schema 2. One of schema 1 keeps its
+/// name of schema and gets null for each key that came later. Throws Error naming the file that is no valid record.
+std::vector<Json> load_separate_records(const std::filesystem::path& folder);
+/// One of these files, where there is any.
+std::optional<std::filesystem::path> separate_record(const std::filesystem::path& folder);
 
 }  // namespace amrtex

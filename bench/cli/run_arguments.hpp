@@ -1,0 +1,28 @@
+// What `amrtex run` and the processes that it starts are given.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "bench/measure/runner.hpp"
+
+namespace amrtex {
+
+/// All that says which experiment it is and where it goes.
+struct RunArguments {
+  std::string input, output, context, memory_limit;
+  std::vector<std::string> set;
+  std::uint64_t max_points = ReadOptions{}.most_points;
+  bool no_pictures = false;
+
+  Experiment experiment() const;
+  RunOptions options() const;
+  /// The same as words of a command line that begins with this program and `measure`.
+  std::vector<std::string> measuring_process() const;
+};
+
+void add_run_arguments(CLI::App& command, RunArguments& arguments);
+
+}  // namespace amrtex
