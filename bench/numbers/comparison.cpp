@@ -32,8 +32,8 @@ std::vector<std::size_t> doubled_ranks(std::span<const double> a, std::span<cons
   return ranks;
 }
 
-/// [s]: the probability that n of the ranks, drawn at random, add up to s. Ranks are asked for one after the other; with k taken and `left`
-/// to be asked, each is taken with (n - k) / left. So no count overflows.
+/// [s]: the probability that n of the ranks, drawn at random, add up to s. Ranks are asked for one after the other; with k taken
+/// and `left` to be asked, each is taken with (n - k) / left. So no count overflows.
 std::vector<double> sum_distribution(std::span<const std::size_t> ranks, std::size_t n) {
   const std::size_t most = std::accumulate(ranks.begin(), ranks.end(), std::size_t{0});
   std::vector<std::vector<double>> taken(n + 1, std::vector<double>(most + 1));
@@ -94,7 +94,6 @@ struct Family {
 };
 
 std::string reason_of(const Comparison& c, const MeasuredRow& row, double smallest_p, const Family& family) {
-  if (!row.unusable.empty()) return row.unusable;
   const bool drifted = row.drifted_a + row.drifted_b > 0;
   if (c.n_a == 0 || c.n_b == 0) return drifted ? drift_text(row) : "no times on both sides";
   const bool called = c.adjusted_p && reaches(*c.adjusted_p, family.rules.level);
@@ -125,7 +124,6 @@ Verdict verdict_of(const Comparison& c, const ComparisonRules& rules) {
 /// All but what needs the other rows.
 Comparison measured(const MeasuredRow& row, double level) {
   Comparison c;
-  if (!row.unusable.empty()) return c;
   c.n_a = row.a.size();
   c.n_b = row.b.size();
   if (!row.a.empty()) c.median_a = median(row.a);

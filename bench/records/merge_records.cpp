@@ -48,9 +48,9 @@ class Programs {
     const auto [place, added] = programs_.try_emplace(point_of(record), Program{implementation, folder});
     // a folder may hold several of itself (--keep-old)
     if (!added && place->second.folder != folder && place->second.implementation != implementation)
-      throw UsageError(fmt::format("{} and {}: point {} was measured by two programs, {} and {}; accepted: folders of one program",
-                                   place->second.folder, folder, place->first.first, shown(place->second.implementation),
-                                   shown(implementation)));
+      throw UsageError(fmt::format(
+          "{} and {}: point {} was measured by two programs, {} and {}; accepted: folders of one program", place->second.folder,
+          folder, place->first.first, shown(place->second.implementation), shown(implementation)));
   }
 
  private:

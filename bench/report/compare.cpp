@@ -26,8 +26,8 @@ using Records = std::vector<const Json*>;
 /// Bytes and what the pictures are; the same on every run of one program in one context.
 constexpr const char* kBytes[] = {"/memory/total_bytes", "/memory/by_role/payload", "/memory/by_role/duplicated",
                                   "/memory/by_role/topology", "/memory/by_role/padding"};
-constexpr const char* kPictures[] = {"/error/rmse",        "/error/p95",        "/error/max",       "/error_common/rmse",
-                                     "/error_common/p95",  "/error_common/max", "/image_hash"};
+constexpr const char* kPictures[] = {"/error/rmse",       "/error/p95",        "/error/max", "/error_common/rmse",
+                                     "/error_common/p95", "/error_common/max", "/image_hash"};
 
 std::string text_at(const Json& record, const char* pointer) {
   const Json& value = value_at(record, pointer);
@@ -61,14 +61,36 @@ std::string context_for_all(const std::vector<Json>& records) {
   return keys.size() == 1 ? *keys.begin() : "";
 }
 
-Side side_of(const ComparedFolder& folder) {
+/// A folder may hold repetitions of an older program, which a later run did not replace: a point's are those of the program that
+/// measured it last. Returns how many are left out.
+std::size_t keep_last_program(Repetitions& point) {
+  const Json* last = point.front();
+  for (const Json* record : point)
+    if (text_at(*record, "/context/date") >= text_at(*last, "/context/date")) last = record;
+  const Json program = value_at(*last, "/implementation");
+  return std::erase_if(point, [&](const Json* record) { return value_at(*record, "/implementation") != program; });
+}
+
+void keep_last_programs(Side& side, std::vector<std::string>& notes) {
+  std::size_t left_out = 0;
+  std::set<std::string> programs;
+  for (auto& [key, point] : side.points) {
+    left_out += keep_last_program(point);
+    programs.insert(text_at(*point.front(), "/implementation"));
+  }
+  if (left_out > 0) notes.push_back(fmt::format("{}: {} records of older programs are left out", side.name, left_out));
+  if (programs.size() > 1) notes.push_back(fmt::format("{}: {} programs measured its points", side.name, programs.size()));
+}
+
+Side side_of(const ComparedFolder& folder, std::vector<std::string>& notes) {
   Side side{folder.name, {}, {}, {}};
   const std::string only = context_for_all(folder.records);
   for (const Json& record : folder.records) {
     const std::string configuration = text_at(record, "/configuration");
     if (configuration.empty())
-      throw UsageError(fmt::format("{}: its records, of schema {}, do not say of which point they are; accepted: records of schema {}",
-                                   folder.name, quote(text_at(record, "/schema")), kRecordSchema));
+      throw UsageError(
+          fmt::format("{}: its records, of schema {}, do not say of which point they are; accepted: records of schema {}",
+                      folder.name, quote(text_at(record, "/schema")), kRecordSchema));
     std::string context = context_key(value_at(record, "/context"));
     if (context.empty()) context = only;
     if (!side.configurations.contains(context)) side.contexts.push_back(context);
@@ -78,6 +100,7 @@ Side side_of(const ComparedFolder& folder) {
   }
   if (side.points.empty())
     throw UsageError(fmt::format("{}: no records; accepted: a folder that `amrtex run` wrote", folder.name));
+  keep_last_programs(side, notes);
   return side;
 }
 
@@ -102,9 +125,10 @@ std::vector<ContextPair> context_pairs(const Side& a, const Side& b, std::vector
     return pairs;
   }
   if (a.contexts.size() == 1 && b.contexts.size() == 1) return {{a.contexts.front(), b.contexts.front()}};
-  throw UsageError(fmt::format("{} holds {} contexts and {} {}, none of them in both; accepted: folders with a context in common, or "
-                               "with one each",
-                               a.name, a.contexts.size(), b.name, b.contexts.size()));
+  throw UsageError(
+      fmt::format("{} holds {} contexts and {} {}, none of them in both; accepted: folders with a context in common, or "
+                  "with one each",
+                  a.name, a.contexts.size(), b.name, b.contexts.size()));
 }
 
 // --- what is exact ---
@@ -184,24 +208,14 @@ Times times_of(const Repetitions& point) {
   return times;
 }
 
-/// Repetitions that several programs drew are of none of them.
-std::string mixed(const char* side, const Repetitions& point) {
-  const Json implementations = value_of(point, "/implementation");
-  if (!implementations.is_array()) return "";
-  return fmt::format("{} programs measured this point in {}: its times are of none of them", implementations.size(), side);
-}
-
 /// A pair of points, before verdicts.
 struct Pair {
   const Json *a, *b;
   Times times_a, times_b;
   bool one_context;
-  std::string unusable;  ///< why its times may not be compared; empty where they may
 };
 
-RepeatedRow repeated(const Pair& pair, std::map<int, double> Times::*what) {
-  return {pair.times_a.*what, pair.times_b.*what};
-}
+RepeatedRow repeated(const Pair& pair, std::map<int, double> Times::*what) { return {pair.times_a.*what, pair.times_b.*what}; }
 
 std::vector<double> values(const std::map<int, double>& by_repetition) {
   std::vector<double> list;
@@ -210,7 +224,7 @@ std::vector<double> values(const std::map<int, double>& by_repetition) {
 }
 
 MeasuredRow row_of(const Pair& pair, std::map<int, double> Times::*what) {
-  return {values(pair.times_a.*what), values(pair.times_b.*what), pair.times_a.drifted, pair.times_b.drifted, pair.unusable};
+  return {values(pair.times_a.*what), values(pair.times_b.*what), pair.times_a.drifted, pair.times_b.drifted};
 }
 
 bool has_relative(const Pair& pair) { return pair.times_a.has_baseline && pair.times_b.has_baseline; }
@@ -276,7 +290,7 @@ KeyAndName line_key(const ComparedPoint& point, const FolderComparison& result, 
 std::vector<Group> baseline_groups(const std::vector<Pair>& pairs, const FolderComparison& result) {
   return groups_by(pairs, [&](std::size_t i) -> KeyAndName {
     const Pair& pair = pairs[i];
-    if (!pair.one_context || !has_relative(pair) || !pair.unusable.empty()) return {};
+    if (!pair.one_context || !has_relative(pair)) return {};
     const std::string name = text_at(*pair.a, "/dataset/name");
     const Json key = Json::array({value_at(*pair.a, "/dataset/exact_hash"), name});
     return line_key(result.points[i], result, key, "baseline of " + name);
@@ -300,8 +314,8 @@ MeasuredRow pooled_row(const Group& group, const std::vector<Pair>& pairs, std::
   return row;
 }
 
-/// Did the baseline change and its rows did not? Then ratios to it changed, and rows go by their times. Else whatever changed, the program or
-/// the machine, changed all alike, and ratios are right.
+/// Did the baseline change and its rows did not? Then ratios to it changed, and rows go by their times. Else whatever changed,
+/// the program or the machine, changed all alike, and ratios are right.
 bool changed_alone(const ComparedLine& line, const Group& group, const std::vector<ComparedPoint>& points) {
   const Verdict verdict = line.comparison.verdict;
   if (verdict != Verdict::slower && verdict != Verdict::faster) return false;
@@ -361,7 +375,7 @@ void give_verdicts(FolderComparison& result, const std::vector<Pair>& pairs) {
 std::vector<ComparedLine> compare_encodings(const FolderComparison& result, const std::vector<Pair>& pairs) {
   std::vector<Group> groups = groups_by(pairs, [&](std::size_t i) -> KeyAndName {
     const ComparedPoint& point = result.points[i];
-    if (!pairs[i].unusable.empty() || (point.by_time && !pairs[i].one_context)) return {};
+    if (point.by_time && !pairs[i].one_context) return {};
     const std::string name = text_at(*pairs[i].a, "/encoding");
     return line_key(point, result, Json::array({name, point.by_time}), name);
   });
@@ -384,9 +398,7 @@ Records paired(const Side& side, const std::string& context, const Side& other, 
 }
 
 Pair pair_of(const Repetitions& a, const Repetitions& b, bool one_context) {
-  Pair pair{&representative(a), &representative(b), times_of(a), times_of(b), one_context, mixed("A", a), 0};
-  if (pair.unusable.empty()) pair.unusable = mixed("B", b);
-  return pair;
+  return {&representative(a), &representative(b), times_of(a), times_of(b), one_context};
 }
 
 /// Have both sides a point with a time?
@@ -413,9 +425,10 @@ std::vector<Pair> pair_points(const Side& a, const Side& b, FolderComparison& re
     }
   }
   if (common == 0)
-    throw UsageError(fmt::format("{} and {} have no point in common, of {} and {}; accepted: two runs of one experiment, with the same "
-                                 "data, settings and frames",
-                                 a.name, b.name, a.points.size(), b.points.size()));
+    throw UsageError(
+        fmt::format("{} and {} have no point in common, of {} and {}; accepted: two runs of one experiment, with the same "
+                    "data, settings and frames",
+                    a.name, b.name, a.points.size(), b.points.size()));
   return pairs;
 }
 
@@ -432,7 +445,7 @@ FolderComparison compare_folders(const ComparedFolder& a, const ComparedFolder& 
   result.rules = rules;
   result.name_a = a.name;
   result.name_b = b.name;
-  const std::vector<Pair> pairs = pair_points(side_of(a), side_of(b), result);
+  const std::vector<Pair> pairs = pair_points(side_of(a, result.notes), side_of(b, result.notes), result);
   const ContextNames contexts(a.records);
   for (Difference& difference : result.differences) difference.context = contexts.of(*difference.record);
   for (const Pair& pair : pairs)
@@ -453,7 +466,8 @@ FolderComparison compare_folders(const ComparedFolder& a, const ComparedFolder& 
 
 bool has_findings(const FolderComparison& comparison) {
   const auto slower = [](const ComparedLine& line) { return line.comparison.verdict == Verdict::slower; };
-  return std::any_of(comparison.differences.begin(), comparison.differences.end(), [](const Difference& d) { return d.counts; }) ||
+  return std::any_of(comparison.differences.begin(), comparison.differences.end(),
+                     [](const Difference& d) { return d.counts; }) ||
          std::any_of(comparison.points.begin(), comparison.points.end(),
                      [](const ComparedPoint& p) { return p.verdict == Verdict::slower; }) ||
          std::any_of(comparison.baselines.begin(), comparison.baselines.end(), slower) ||

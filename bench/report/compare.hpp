@@ -22,9 +22,9 @@ struct ComparedFolder {
 struct Difference {
   const Json* record;   ///< of the point, in A
   std::string context;  ///< of A, as tables call it
-  std::string what;    ///< "status", or a JSON pointer
-  Json a, b;           ///< a list where repetitions of one side differ among themselves
-  bool counts;         ///< false: two drivers may differ here
+  std::string what;     ///< "status", or a JSON pointer
+  Json a, b;            ///< a list where repetitions of one side differ among themselves
+  bool counts;          ///< false: two drivers may differ here
 };
 
 /// Times of one point on both sides. Records live in the folders that were compared.
@@ -60,9 +60,9 @@ struct FolderComparison {
   std::size_t smallest_repeat = 0;      ///< that can decide for so many points
 };
 
-/// Pairs points by `configuration` and context. Contexts that both have are compared with themselves; where there is none and each side has
-/// one, these two are, by ratios to their own baselines alone. The result points into the folders. Throws UsageError where nothing can be
-/// paired, naming both.
+/// Pairs points by `configuration` and context. Contexts that both have are compared with themselves; where there is none and
+/// each side has one, these two are, by ratios to their own baselines alone. The result points into the folders. Throws
+/// UsageError where nothing can be paired, naming both.
 FolderComparison compare_folders(const ComparedFolder& a, const ComparedFolder& b, const ComparisonRules& rules);
 
 /// Is a point, an encoding or a baseline slower, or does something that counts differ?

@@ -74,7 +74,8 @@ const Comparison* deciding(const ComparedPoint& point) {
   return found ? &*found : nullptr;
 }
 
-Table points_table(const FolderComparison& comparison, const std::string& context, const std::vector<const ComparedPoint*>& points) {
+Table points_table(const FolderComparison& comparison, const std::string& context,
+                   const std::vector<const ComparedPoint*>& points) {
   Records records;
   std::vector<const Found*> relative, time;
   std::vector<const Comparison*> decisions;
@@ -97,8 +98,9 @@ Table points_table(const FolderComparison& comparison, const std::string& contex
   add_column(table, "verdict", "verdict", false, verdicts);
   table.notes.push_back(level_note(comparison.rules));
   if (any(relative) && std::any_of(points.begin(), points.end(), [](const ComparedPoint* p) { return !p->by_time; }))
-    table.notes.push_back("n, interval, p and verdict are those of time / baseline where the point has one and its baseline did not "
-                          "change alone");
+    table.notes.push_back(
+        "n, interval, p and verdict are those of time / baseline where the point has one and its baseline did not "
+        "change alone");
   return table;
 }
 
@@ -133,9 +135,8 @@ Table differences_table(const FolderComparison& comparison) {
     b.push_back(cell_of(d.b));
   }
   Table table = make_setting_table("what differs", records, records, {});
-  const bool several = std::any_of(comparison.differences.begin(), comparison.differences.end(), [&](const Difference& d) {
-    return d.context != comparison.differences.front().context;
-  });
+  const bool several = std::any_of(comparison.differences.begin(), comparison.differences.end(),
+                                   [&](const Difference& d) { return d.context != comparison.differences.front().context; });
   if (several) add_column(table, "renderer", "renderer", false, contexts);
   add_column(table, "what", "what", false, what);
   add_column(table, "a", "A", true, a);
@@ -222,7 +223,8 @@ std::string comparison_summary(const FolderComparison& comparison) {
     text += fmt::format("; {} points only in A, {} only in B", comparison.only_a.size(), comparison.only_b.size());
   text += "\n";
   if (!comparison.points.empty())
-    text += fmt::format("the smallest --repeat that can decide {} points: {}\n", comparison.points.size(), comparison.smallest_repeat);
+    text += fmt::format("the smallest --repeat that can decide {} points: {}\n", comparison.points.size(),
+                        comparison.smallest_repeat);
   return text;
 }
 

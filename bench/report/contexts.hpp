@@ -9,8 +9,8 @@
 
 namespace amrtex {
 
-/// The renderer's name; where several contexts have it, with what tells them apart: device, GL version, processor, cores. "none" for records
-/// without a context.
+/// The renderer's name; where several contexts have it, with what tells them apart: device, GL version, processor, cores. "none"
+/// for records without a context.
 class ContextNames {
  public:
   explicit ContextNames(std::span<const Json> records);

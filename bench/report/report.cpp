@@ -480,7 +480,9 @@ std::vector<std::string> unchecked_notes(std::span<const Json* const> records) {
   return notes;
 }
 
-std::vector<const Json*> in_table_order(std::span<const Json* const> records) { return in_order({records.begin(), records.end()}); }
+std::vector<const Json*> in_table_order(std::span<const Json* const> records) {
+  return in_order({records.begin(), records.end()});
+}
 
 std::vector<std::string_view> column_keys() {
   std::vector<std::string_view> keys;

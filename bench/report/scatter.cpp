@@ -111,8 +111,8 @@ Json setting_key(const Json& record) {
   Json render = value_at(record, "/render");
   for (const char* key : {"view", "view_name"}) render.erase(key);
   Json key = Json::array({context_key(value_at(record, "/context"))});
-  for (const char* pointer : {"/experiment", "/dataset/name", "/dataset/hash", "/dataset/exact_hash",
-                              "/dataset/field", "/encoding", "/build_parameters", "/filter", "/storage", "/filtering"})
+  for (const char* pointer : {"/experiment", "/dataset/name", "/dataset/hash", "/dataset/exact_hash", "/dataset/field",
+                              "/encoding", "/build_parameters", "/filter", "/storage", "/filtering"})
     key.push_back(value_at(record, pointer));
   key.push_back(std::move(render));
   return key;

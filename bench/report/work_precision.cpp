@@ -125,12 +125,13 @@ std::vector<Scene> scenes_of(std::span<const Json> records, const Question& ques
   std::vector<Scene> scenes;
   const ContextNames contexts(records);
   for (const Json& record : records) {
-    const Json key =
-        Json::array({contexts.of(record), value_at(record, "/dataset/hash"),
-                     value_at(record, "/dataset/exact_hash"), value_at(record, "/dataset/field"),
-                     scene_part(value_at(record, "/render")), question.common ? Json() : value_at(record, "/filter")});
+    const Json key = Json::array({contexts.of(record), value_at(record, "/dataset/hash"), value_at(record, "/dataset/exact_hash"),
+                                  value_at(record, "/dataset/field"), scene_part(value_at(record, "/render")),
+                                  question.common ? Json() : value_at(record, "/filter")});
     const auto [place, added] = places.try_emplace(key.dump(), scenes.size());
-    if (added) scenes.push_back({contexts.of(record), scene_name(record) + (question.common ? "" : ", " + text_at(record, "/filter")), {}});
+    if (added)
+      scenes.push_back(
+          {contexts.of(record), scene_name(record) + (question.common ? "" : ", " + text_at(record, "/filter")), {}});
     scenes[place->second].records.push_back(&record);
   }
   std::stable_sort(scenes.begin(), scenes.end(), [](const Scene& a, const Scene& b) { return a.name < b.name; });
