@@ -22,6 +22,7 @@ void add_structure_command(CLI::App& app, Command& chosen);
 void add_render_command(CLI::App& app, Command& chosen);
 void add_run_commands(CLI::App& app, Command& chosen);  // run, report
 void add_measure_command(CLI::App& app, Command& chosen);
+void add_compare_commands(CLI::App& app, Command& chosen);  // compare, merge
 void add_verify_command(CLI::App& app, Command& chosen);
 void add_advise_command(CLI::App& app, Command& chosen);
 void add_settings_command(CLI::App& app, Command& chosen);

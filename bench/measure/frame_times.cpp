@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "bench/measure/timing.hpp"
+#include "bench/numbers/baseline_drift.hpp"
 #include "bench/numbers/statistics.hpp"
 #include "bench/records/record.hpp"
 #include "renderers/consumers/make_consumer.hpp"
@@ -14,8 +14,6 @@
 namespace amrtex {
 namespace {
 
-/// Two readings of the baseline that differ by more say that the machine was busy.
-constexpr double kBaselineDrift = 0.15;
 constexpr int kBaselineFrames = 3;
 constexpr int kTimingTries = 4;
 
@@ -24,7 +22,7 @@ struct BaselineTimes {
   double before = 0;
   double after = 0;
 
-  bool agree() const { return std::abs(after - before) <= kBaselineDrift * std::min(before, after); }
+  bool agree() const { return baselines_agree(before, after); }
   double mean() const { return (before + after) / 2; }
 };
 

@@ -227,8 +227,8 @@ void add_column(Table& table, const std::string& dataset, const std::string& who
   for (std::size_t row = 0; row < cells.size(); ++row) table.rows[row].push_back(cells[row]);
 }
 
-Table make_table(const Entry& entry, const std::string& renderer, const Records& records) {
-  Table table{entry.title, {{"renderer", renderer}}, entry.notes, {{"row", "quantity", "", false}}, {}};
+Table make_table(const Entry& entry, const std::string& context, const Records& records) {
+  Table table{entry.title, {{"renderer", context}}, entry.notes, {{"row", "quantity", "", false}}, {}};
   Notes notes;
   for (const Row& row : entry.rows) table.rows.push_back({row.ours.label});
   for (std::size_t i = 0; i < entry.datasets.size(); ++i) {
@@ -259,14 +259,12 @@ std::vector<Table> make_paper_tables(const std::filesystem::path& path, std::spa
   std::vector<Entry> entries;
   for (const JsonNode& node : file.root().items())
     if (!node.find("work_precision") && !node.find("scatter")) entries.push_back(read_entry(node));  // those make diagrams
-  std::map<std::string, Records> by_renderer;  // their times do not belong side by side
-  for (const Json& record : records) {
-    const Json renderer = at(record, "/context/renderer");
-    by_renderer[renderer.is_null() ? "none" : renderer.get<std::string>()].push_back(&record);
-  }
+  std::map<std::string, Records> by_context;
+  const ContextNames contexts(records);
+  for (const Json& record : records) by_context[contexts.of(record)].push_back(&record);
   std::vector<Table> tables;
   for (const Entry& entry : entries)
-    for (const auto& [renderer, members] : by_renderer) tables.push_back(make_table(entry, renderer, members));
+    for (const auto& [context, members] : by_context) tables.push_back(make_table(entry, context, members));
   return tables;
 }
 

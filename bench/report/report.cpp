@@ -10,6 +10,7 @@
 #include <set>
 
 #include "bench/records/record.hpp"
+#include "bench/report/contexts.hpp"
 #include "bench/settings/json_file.hpp"
 #include "bench/settings/settings_table.hpp"
 #include "structures/mesh/error.hpp"
@@ -479,6 +480,10 @@ std::vector<std::string> unchecked_notes(std::span<const Json* const> records) {
   return notes;
 }
 
+std::vector<const Json*> in_table_order(std::span<const Json* const> records) {
+  return in_order({records.begin(), records.end()});
+}
+
 std::vector<std::string_view> column_keys() {
   std::vector<std::string_view> keys;
   for (const ColumnRule& rule : all_columns()) keys.emplace_back(rule.key);
@@ -487,10 +492,8 @@ std::vector<std::string_view> column_keys() {
 
 std::vector<Table> make_tables(std::span<const Json> records, const ReportOptions& options) {
   std::map<std::pair<std::string, std::string>, Records> groups;
-  for (const Json& record : records) {
-    const Json& renderer = at(record, "/context/renderer");
-    groups[{text_of(at(record, "/experiment")), renderer.is_null() ? "none" : text_of(renderer)}].push_back(&record);
-  }
+  const ContextNames contexts(records);
+  for (const Json& record : records) groups[{text_of(at(record, "/experiment")), contexts.of(record)}].push_back(&record);
   std::vector<Table> tables;
   for (const auto& [names, members] : groups) {
     tables.push_back(make_table(names.first, names.second, members, options));

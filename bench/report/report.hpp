@@ -1,5 +1,5 @@
-// Tables from records alone: one for each experiment and renderer, since the times of
-// different renderers do not belong side by side.
+// Tables from records alone: one for each experiment and context, since the times of
+// different contexts do not belong side by side.
 #pragma once
 
 #include <filesystem>
@@ -32,6 +32,9 @@ std::vector<Table> make_tables(std::span<const Json> records, const ReportOption
 /// `measures`. What is the same in all stands above the table. Throws UsageError for an unknown column.
 Table make_setting_table(std::string title, std::span<const Json* const> rows, std::span<const Json* const> all,
                          std::span<const std::string_view> measures);
+
+/// By data set, encoding, build parameters and so on: the order that rows have in tables.
+std::vector<const Json*> in_table_order(std::span<const Json* const> records);
 
 /// Why pictures of these records were not checked, and how many; null pointers are rows without a record. Nothing where all were.
 std::vector<std::string> unchecked_notes(std::span<const Json* const> records);

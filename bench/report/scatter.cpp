@@ -13,6 +13,8 @@
 #include "bench/numbers/statistics.hpp"
 #include "bench/records/record.hpp"
 #include "bench/records/record_conditions.hpp"
+#include "bench/records/record_file.hpp"
+#include "bench/report/contexts.hpp"
 #include "bench/report/report.hpp"
 #include "bench/settings/json_file.hpp"
 
@@ -40,7 +42,7 @@ struct Question {
 
 /// One setting from several views: a value of the quantity and of each that it is set against, a view.
 struct Group {
-  std::string renderer;
+  std::string context;
   Json setting;  ///< a record for all, whose view is their number
   std::vector<std::string> views;
   std::vector<double> y;
@@ -108,9 +110,9 @@ std::string text_at(const Json& record, const std::string& pointer) {
 Json setting_key(const Json& record) {
   Json render = value_at(record, "/render");
   for (const char* key : {"view", "view_name"}) render.erase(key);
-  Json key = Json::array();
-  for (const char* pointer : {"/experiment", "/context/renderer", "/dataset/name", "/dataset/hash", "/dataset/exact_hash",
-                              "/dataset/field", "/encoding", "/build_parameters", "/filter", "/storage", "/filtering"})
+  Json key = Json::array({context_key(value_at(record, "/context"))});
+  for (const char* pointer : {"/experiment", "/dataset/name", "/dataset/hash", "/dataset/exact_hash", "/dataset/field",
+                              "/encoding", "/build_parameters", "/filter", "/storage", "/filtering"})
     key.push_back(value_at(record, pointer));
   key.push_back(std::move(render));
   return key;
@@ -130,12 +132,13 @@ void add_view(const Json& record, const Question& question, Group& group) {
 /// By name of the data set; `too_few`: settings of fewer than three views with all numbers.
 std::vector<Group> groups_of(std::span<const Json> records, const Question& question, std::size_t& too_few) {
   std::map<std::string, Group> by_key;
+  const ContextNames contexts(records);
   for (const Json& record : records) {
     if (text_at(record, "/status") != "ok" || !value_at(record, "/render").is_object() || !matches(record, question.where))
       continue;
     Group& group = by_key[setting_key(record).dump()];
     if (group.x.empty()) {
-      group.renderer = text_at(record, "/context/renderer");
+      group.context = contexts.of(record);
       group.setting = record;
       group.x.resize(question.against.size());
     }
@@ -159,7 +162,7 @@ double mean(std::span<const double> values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-/// `groups` of one renderer. One row a group and quantity.
+/// `groups` of one context. One row a group and quantity.
 Table make_table(const Question& question, const std::vector<const Group*>& groups) {
   Records rows, all;
   for (const Group* group : groups) {
@@ -167,7 +170,7 @@ Table make_table(const Question& question, const std::vector<const Group*>& grou
     rows.insert(rows.end(), question.against.size(), &group->setting);
   }
   Table table = make_setting_table(question.title, rows, all, {});
-  table.constants.emplace(table.constants.begin(), "renderer", groups.front()->renderer);
+  table.constants.emplace(table.constants.begin(), "renderer", groups.front()->context);
   table.notes.insert(table.notes.begin(), question.notes.begin(), question.notes.end());
   table.columns.push_back({"against", "against", "", false});
   for (const char* which : {"least", "mean", "most"}) table.columns.push_back({which, fmt::format("{} a view", which), "", true});
@@ -262,9 +265,9 @@ Scatter make_scatter(const std::filesystem::path& path, std::span<const Json> re
     const Question question = read_question(entry);
     std::size_t too_few = 0;
     const std::vector<Group> groups = groups_of(records, question, too_few);
-    std::map<std::string, std::vector<const Group*>> by_renderer;
-    for (const Group& group : groups) by_renderer[group.renderer].push_back(&group);
-    for (const auto& [renderer, members] : by_renderer) {
+    std::map<std::string, std::vector<const Group*>> by_context;
+    for (const Group& group : groups) by_context[group.context].push_back(&group);
+    for (const auto& [context, members] : by_context) {
       Table table = make_table(question, members);
       if (too_few > 0) table.notes.push_back(fmt::format("{} settings with fewer than three views are left out", too_few));
       for (std::size_t i = 0; i < members.size(); ++i) {

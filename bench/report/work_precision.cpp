@@ -13,6 +13,7 @@
 
 #include "bench/numbers/pareto.hpp"
 #include "bench/records/record.hpp"
+#include "bench/report/contexts.hpp"
 #include "bench/report/report.hpp"
 #include "bench/settings/json_file.hpp"
 
@@ -34,8 +35,9 @@ struct Question {
   const char* error() const { return common ? "/error_common" : "/error"; }
 };
 
-/// Records of one scene and renderer.
+/// Records of one scene and context.
 struct Scene {
+  std::string context;
   std::string name;  ///< data set, view, transfer function, mode
   Records records;
 };
@@ -117,19 +119,19 @@ std::string scene_name(const Json& record) {
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
-std::string renderer_of(const Scene& scene) { return text_at(*scene.records.front(), "/context/renderer"); }
-
 /// By name. Where errors are those of the own filter, a scene is that of one filter.
 std::vector<Scene> scenes_of(std::span<const Json> records, const Question& question) {
   std::map<std::string, std::size_t> places;
   std::vector<Scene> scenes;
+  const ContextNames contexts(records);
   for (const Json& record : records) {
-    const Json key =
-        Json::array({value_at(record, "/context/renderer"), value_at(record, "/dataset/hash"),
-                     value_at(record, "/dataset/exact_hash"), value_at(record, "/dataset/field"),
-                     scene_part(value_at(record, "/render")), question.common ? Json() : value_at(record, "/filter")});
+    const Json key = Json::array({contexts.of(record), value_at(record, "/dataset/hash"), value_at(record, "/dataset/exact_hash"),
+                                  value_at(record, "/dataset/field"), scene_part(value_at(record, "/render")),
+                                  question.common ? Json() : value_at(record, "/filter")});
     const auto [place, added] = places.try_emplace(key.dump(), scenes.size());
-    if (added) scenes.push_back({scene_name(record) + (question.common ? "" : ", " + text_at(record, "/filter")), {}});
+    if (added)
+      scenes.push_back(
+          {contexts.of(record), scene_name(record) + (question.common ? "" : ", " + text_at(record, "/filter")), {}});
     scenes[place->second].records.push_back(&record);
   }
   std::stable_sort(scenes.begin(), scenes.end(), [](const Scene& a, const Scene& b) { return a.name < b.name; });
@@ -195,7 +197,7 @@ Table fastest_table(const Scene& scene, const Question& question) {
   }
   Table table = make_setting_table(fmt::format("{}: the fastest setting, {}", question.title, scene.name), rows, scene.records,
                                    measures_of(question));
-  table.constants.emplace(table.constants.begin(), "renderer", renderer_of(scene));
+  table.constants.emplace(table.constants.begin(), "renderer", scene.context);
   table.notes.insert(table.notes.end(), notes.begin(), notes.end());
   table.notes.insert(table.notes.end(), question.notes.begin(), question.notes.end());
   add_column(table, 0, {"asked", "asked", "", false}, asked);
@@ -209,7 +211,7 @@ Table front_table(const Scene& scene, const Question& question) {
   for (const std::size_t i : pareto_front(points)) rows.push_back(scene.records[i]);
   Table table = make_setting_table(fmt::format("{}: what no other setting beats, {}", question.title, scene.name), rows,
                                    scene.records, measures_of(question));
-  table.constants.emplace(table.constants.begin(), "renderer", renderer_of(scene));
+  table.constants.emplace(table.constants.begin(), "renderer", scene.context);
   table.notes.push_back(what_error(question, scene.records));
   table.notes.push_back(fmt::format("{} of {} points", rows.size(), scene.records.size()));
   return table;
@@ -235,7 +237,7 @@ std::vector<Cell> fastest_times(const Scene& scene, const Question& question, co
 
 Table encodings_table(const Scene& scene, const Question& question) {
   Table table{fmt::format("{}: the fastest setting of each encoding, frame, wall (ms), {}", question.title, scene.name),
-              {{"renderer", renderer_of(scene)}},
+              {{"renderer", scene.context}},
               {what_error(question, scene.records)},
               {{"encoding", "encoding", "", false}},
               {}};
