@@ -28,13 +28,13 @@ UNIFORM(real, u_error_bound)   // of a pixel: the bounds of its intervals togeth
 // Opens the account of a ray of length `whole`, or of the `part` of it that is drawn alone and begins at `begin`.
 void open_account(INOUT(Accumulation) a, IN(real) whole, IN(real) begin, IN(real) part) {
   a.whole = whole;
-  a.passed = -begin;
+  a.earlier = -begin;
   a.spent = u_error_bound * AMRTEX_GRANTED_AT_ONCE * max(real(1) - part / whole, real(0));
 }
 
 // What a ray that has come to `place` with this transmittance may be off by.
 real granted_error(IN(Accumulation) a, IN(real) place, IN(real) transmittance) {
-  real way = min((a.passed + place) / a.whole, real(1));
+  real way = min((a.earlier + place) / a.whole, real(1));
   return u_error_bound * (AMRTEX_GRANTED_AT_ONCE + AMRTEX_GRANTED_ON_THE_WAY * (way + real(1) - transmittance));
 }
 
