@@ -113,7 +113,7 @@ int run(const Arguments& a) {
     for (const Table& t : tables) fmt::print("{}\n", to_markdown(t));
     fmt::print("{} points measured, {} kept, {} unsupported, {} over budget, {} failed\n", s.measured, s.kept, s.unsupported,
                s.over_budget, s.failed);
-    fmt::print("records, pictures and tables: {}\n", a.output);
+    fmt::print("records, pictures and tables: {}\n", printable(a.output));
   }
   return s.failed > 0 ? 1 : 0;
 }
