@@ -34,14 +34,11 @@ struct ContextInfo {
   int max_3d_texture_size = 2048;                                             ///< texels along an axis
   std::int64_t max_texture_bytes = std::numeric_limits<std::int64_t>::max();  ///< of one 3D texture
   std::int64_t max_buffer_bytes = std::int64_t{1} << 27;                      ///< of one shader storage block
-  /// Of one 3D texture.
-  std::int64_t max_texture_bytes = std::numeric_limits<std::int64_t>::max();
   bool bindless_texture = true;  ///< textures by handles; without a context they are fetched on the CPU
   bool shader_ballot = true;
   bool handles_may_differ = false;  ///< in one fetch, between invocations that run together; else each is served in turn
   std::int64_t max_resident_handles = std::numeric_limits<std::int64_t>::max();  ///< textures reached by handles at a time
   std::vector<std::string> extensions;
-  bool has_texture_limit() const { return max_texture_bytes != std::numeric_limits<std::int64_t>::max(); }
   bool has_texture_limit() const { return max_texture_bytes != std::numeric_limits<std::int64_t>::max(); }
   bool has_handle_limit() const { return max_resident_handles != std::numeric_limits<std::int64_t>::max(); }
 };
@@ -100,7 +97,6 @@ struct EncodedField {
   int field_count = 1;
   StorageScale scale;                      ///< of the first field
   std::vector<StorageScale> more_scales;   ///< of the others
-  std::vector<FieldStatistics> values;     ///< of each field
   double range_origin = 0;                 ///< what coded value ranges are relative to (build_tools.hpp)
   std::vector<double> more_range_origins;  ///< of the other fields, where they have ranges (SceneNeeds::field_ranges)
   /// What was asked to be left out where nothing is to be seen (SceneNeeds::invisible): such a field shows no scene that sees any
