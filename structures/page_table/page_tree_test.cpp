@@ -148,7 +148,7 @@ TEST(TableTree, DeepCornersCostWhatTheyHold) {
 }
 
 TEST(TableTree, TakesRatiosOfAnyKind) {
-  std::vector<int> ratios{2, 3, 5, 2, 7, 4, 3, 2, 11, 2, 4};
+  std::vector<int> ratios{2, 3, 5, 2, 4, 3, 2, 5, 2};
   MeshBuilder mesh(Vec3i(6), ratios);
   mesh.root(waves);
   Box box{Vec3i(2), Vec3i(4)};
