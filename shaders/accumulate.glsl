@@ -53,7 +53,7 @@ STRUCT Accumulation {
   int end_level;       // by tolerance: level of the region that it was taken in, ...
   real stride;         // ... length of the next interval to try, ...
   real whole;          // ... of the ray, ...
-  real passed;         // ... of the part of it before this one, ...
+  real earlier;        // ... of the part of it before this one, ...
   real spent;          // ... and the bound of the error so far
   vec4r surface;       // depth: world distance to the first surface; normal: its normal, 1
   bool probing;        // a secondary ray that looks for surfaces and gathers nothing
@@ -80,7 +80,7 @@ Accumulation empty_accumulation() {
   a.end_level = -1;
   a.stride = real(1e30);
   a.whole = real(1);
-  a.passed = real(0);
+  a.earlier = real(0);
   a.spent = real(0);
   a.surface = vec4r(0);
   a.probing = false;

@@ -94,7 +94,7 @@ vec4r march_ray(IN(Ray) ray, INOUT(Accumulation) a) {
     a.before = ray_real(0);  // on the mirror, where the part before noted its side
     a.end_state = AMRTEX_END_NONE;
     a.end_level = -1;
-    a.passed = real(part.start - ray.start);
+    a.earlier = real(part.start - ray.start);
     if (drawn) march_part(part, a);
   }
 #else

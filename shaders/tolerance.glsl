@@ -28,13 +28,13 @@ UNIFORM(real, u_error_bound)   // of a pixel: the bounds of its intervals togeth
 // Opens the account of a ray of length `whole`, or of the `part` of it that is drawn alone and begins at `begin`.
 void open_account(INOUT(Accumulation) a, IN(real) whole, IN(real) begin, IN(real) part) {
   a.whole = whole;
-  a.passed = -begin;
+  a.earlier = -begin;
   a.spent = u_error_bound * AMRTEX_GRANTED_AT_ONCE * max(real(1) - part / whole, real(0));
 }
 
 // What a ray that has come to `place` with this transmittance may be off by.
 real granted_error(IN(Accumulation) a, IN(real) place, IN(real) transmittance) {
-  real way = min((a.passed + place) / a.whole, real(1));
+  real way = min((a.earlier + place) / a.whole, real(1));
   return u_error_bound * (AMRTEX_GRANTED_AT_ONCE + AMRTEX_GRANTED_ON_THE_WAY * (way + real(1) - transmittance));
 }
 
@@ -234,7 +234,8 @@ Interval interval_of(IN(Piece) p, IN(real) s0, IN(real) s1, IN(real) length) {
   // Extinction is off by no more than its steepest slope makes of the bend, two thirds of that in the mean. Where the line crosses the curve's
   // features, they are moved by no more than the time in which it goes as far as f bends.
   real crossing = min(real(2) * bend / max(abs(to - from), real(1e-30)), real(1));
-  real shift = min(min(e.slope * bend * real(0.6667), e.swing * crossing), e.most - e.least);
+  real mean_bend = AMRTEX_LOGARITHMIC == 0 ? bend * (real(2) / real(3)) : bend;
+  real shift = min(min(e.slope * mean_bend, e.swing * crossing), e.most - e.least);
   real tint = min(e.color_slope * bend, e.color_swing);
   if (AMRTEX_LOGARITHMIC == 0 && e.stretches == 1 && p.off == real(0)) {
     // extinction is a cubic too: its mean is exact, and what its course is off by moves light between places that differ less
@@ -288,6 +289,10 @@ bool take_value(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q, OUT(real) valu
   return !(AMRTEX_VALIDITY != 0 && is_no_value(value));
 }
 
+// Does the value at the end of a piece serve the next one? Not where a cell's face is its neighbour's, and not over log10: rounded from one side it is
+// nothing from the other.
+#define AMRTEX_ENDS_SHARED (AMRTEX_VALIDITY == 0 && AMRTEX_LOGARITHMIC == 0)
+
 // f along the piece from t to t + way; false where it has no value. `from`: f at t where `has_from`, and then at the end.
 bool take_piece(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(vec3r) dq, IN(real) t, IN(real) way, INOUT(real) from,
                 INOUT(bool) has_from, OUT(Piece) p) {
@@ -301,7 +306,7 @@ bool take_piece(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(vec3r) dq,
     p = cubic_through(f, false);
     return true;
   }
-  bool inner = AMRTEX_VALIDITY != 0;  // a cell's face is its neighbour's
+  bool inner = AMRTEX_VALIDITY != 0;
   bool valued = true;
   for (int i = 0; i < 4; ++i) {
     real place = inner ? real(0.125) + real(0.25) * real(i) : real(i) / real(3);
@@ -309,19 +314,26 @@ bool take_piece(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(vec3r) dq,
     if (!(i == 0 && has_from)) valued = take_value(a, r, q0 + dq * (t + way * place), value) && valued;
     f[i] = value;
   }
-  has_from = !inner;
+  has_from = AMRTEX_ENDS_SHARED;
   from = f.w;
   p = cubic_through(f, inner);
   return valued;
 }
 
-// Marches a piece of f from t on, over `way` at most; returns how far it came. A quotient of sums of hats is no cubic: it may be off by twice
-// what it is off by in the middle, and a short enough piece is close to one.
-real march_quotient(INOUT(Accumulation) a, IN(Region) r, INOUT(Piece) p, IN(vec3r) middle, IN(real) begin, IN(real) way, IN(real) least) {
-  real value;
-  bool valued = take_value(a, r, middle, value);
-  if (valued && way > AMRTEX_SHORTEST_PIECE * real(r.width)) p.off = real(2) * abs(value - piece_value(p, real(0.5)));
-  return march_piece(a, p, begin, way, least);
+// Is f known to be a cubic on a piece, as well as the curves can tell?
+#define AMRTEX_EXACT_PIECES (AMRTEX_FILTER != AMRTEX_FILTER_BASIS && AMRTEX_LOGARITHMIC == 0)
+
+// How far f may be from the cubic through four of its values. A quotient of sums of hats: twice what it is off by in the middle. Over log10 the rounding
+// of the largest value counts where others are so much smaller.
+real off_cubic(INOUT(Accumulation) a, IN(Region) r, IN(Piece) p, IN(vec3r) middle) {
+  real off = real(0);
+  if (AMRTEX_FILTER == AMRTEX_FILTER_BASIS) {
+    real value;
+    if (take_value(a, r, middle, value)) off = real(2) * abs(value - piece_value(p, real(0.5)));
+  }
+  vec4r size = abs(p.power);
+  if (AMRTEX_LOGARITHMIC != 0) off += (size.x + size.y + size.z + size.w) * ((real(1) - AMRTEX_BELOW_ONE) * real(64));
+  return off;
 }
 
 // ---- regions
@@ -341,7 +353,7 @@ real even_error(IN(Extent) e, IN(real) length) { return (e.most - e.least) * len
 
 // Does the value at the end of the region before hold at the beginning of this one?
 bool end_continues(IN(Accumulation) a, IN(Region) r) {
-  if (AMRTEX_VALIDITY != 0 || a.end_level < 0) return false;
+  if (!AMRTEX_ENDS_SHARED || a.end_level < 0) return false;
   return AMRTEX_CONTINUOUS != 0 || a.end_level == r.level;
 }
 
@@ -417,8 +429,9 @@ void march_tolerance_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, I
       }
       Piece p;
       bool valued = way > real(0) && take_piece(a, r, q0, dq, t, way, from, has_from, p);
-      if (valued && AMRTEX_FILTER == AMRTEX_FILTER_BASIS) {
-        real done = march_quotient(a, r, p, q0 + dq * (t + way * real(0.5)), begin + t, way, least);
+      if (valued && !AMRTEX_EXACT_PIECES) {
+        if (way > AMRTEX_SHORTEST_PIECE * real(r.width)) p.off = off_cubic(a, r, p, q0 + dq * (t + way * real(0.5)));
+        real done = march_piece(a, p, begin + t, way, least);
         has_from = has_from && done == real(1);
         longest = done < real(1) ? way * real(0.25) : way * real(2);
         way *= done;

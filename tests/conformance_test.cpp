@@ -30,7 +30,7 @@ bool power_of_two(const AmrHierarchy& h) {
 enum Mesh : std::size_t { single, nested_2, nested_4_2, nested_3_2, jump, holes, holes_3, one_cell };
 const std::vector<std::size_t> kAllMeshes{single, nested_2, nested_4_2, nested_3_2, jump, holes, holes_3, one_cell};
 
-std::size_t number_of(const AmrHierarchy& h) {
+std::size_t number_of_mesh(const AmrHierarchy& h) {
   const auto same = [&](const NamedMesh& mesh) { return &mesh.hierarchy == &h; };
   return static_cast<std::size_t>(std::find_if(meshes().begin(), meshes().end(), same) - meshes().begin());
 }
@@ -198,7 +198,7 @@ TEST(Conformance, NearestHasTheLeafsBitsInEveryEncoding) {
   Context& gl = context(ContextKind::egl);
   for_each_case(kAllMeshes, [&](const AmrHierarchy& h, const EncodingCase& c) {
     if (c.filter != Filter::nearest) return;
-    const std::size_t mesh = number_of(h);
+    const std::size_t mesh = number_of_mesh(h);
     const auto positions = probe_positions(h, 60);
     Values leaves;
     for (const FinestPosition& p : positions) {

@@ -187,7 +187,7 @@ TEST(Layout, CountsPartsThatNoNumberHolds) {
   const Part part = texture_part("all", "all", TexelFormat::rg32ui, Vec3i(std::numeric_limits<int>::max()));
   EXPECT_EQ(part.bytes(), std::numeric_limits<std::int64_t>::max());
   const Declared encoding;
-  const BuildRequest request;
+  BuildRequest request;
   Layout layout = small_layout(encoding, request);
   layout.add(part);
   EXPECT_EQ(layout.bytes(), std::numeric_limits<std::int64_t>::max());

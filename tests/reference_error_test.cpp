@@ -13,6 +13,7 @@
 #include "bench/measure/reference_cache.hpp"
 #include "bench/measure/runner.hpp"
 #include "bench/settings/experiment.hpp"
+#include "bench/verify/pictures.hpp"
 #include "bench/verify/stiff_media.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
 #include "renderers/reference/nested_rule.hpp"

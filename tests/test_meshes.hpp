@@ -34,16 +34,17 @@ inline MeshBuilder fields_with_gaps() {
   return mesh.also("g", g);
 }
 
-/// 4^3 root cells; each further level refines the middle 2^3 of the 4^3 cells of the one before. Values at random.
-inline AmrHierarchy deep_corner(int levels) {
+/// 4^3 root cells, or 2^3; each further level refines the middle 2^3 of the 4^3 cells of the one before. Values at random.
+inline AmrHierarchy deep_corner(int levels, int root = 4) {
   std::mt19937_64 random(static_cast<std::uint64_t>(levels));
   std::uniform_real_distribution<double> unit(0, 1);
-  MeshBuilder mesh(Vec3i(4), std::vector<int>(static_cast<std::size_t>(levels - 1), 2));
+  MeshBuilder mesh(Vec3i(root), std::vector<int>(static_cast<std::size_t>(levels - 1), 2));
   for (int level = 0; level < levels; ++level) {
-    const Vec3i middle(1 << (level + 1));
-    std::vector<double> values(64);
+    const Vec3i middle(root / 2 << level);
+    const Vec3i half(std::min(root / 2 << level, 2));
+    std::vector<double> values(static_cast<std::size_t>(Box{-half, half}.cells()));
     for (double& v : values) v = unit(random);
-    mesh.patch(level, {middle - Vec3i(2), middle + Vec3i(2)}, std::move(values));
+    mesh.patch(level, {middle - half, middle + half}, std::move(values));
   }
   return mesh.hierarchy();
 }

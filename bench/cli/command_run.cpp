@@ -178,7 +178,7 @@ void print_summary(const Arguments& a, const RunSummary& s, const std::vector<Ta
              s.over_budget, s.failed);
   if (s.left > 0) fmt::print("{} points left when the time was over; the same command goes on\n", s.left);
   fmt::print("time: {}\n", shares_text(s));
-  fmt::print("records, pictures and tables: {}\n", a.output);
+  fmt::print("records, pictures and tables: {}\n", printable(a.output));
 }
 
 RunSummary measure(const Arguments& a, const Experiment& experiment, RunOptions options) {

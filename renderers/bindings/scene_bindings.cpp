@@ -22,7 +22,7 @@ namespace {
 constexpr double kToleranceLeft = 0.1;
 /// What the bounds of a pixel's intervals may come to, in tolerances. Errors are smaller than their bounds and cancel in part;
 /// the factor is measured (tests/tolerance_test.cpp), and no pixel is off by more than it and kToleranceLeft.
-constexpr double kSumOfBounds = 2;
+constexpr double kSumOfBounds = 1.5;
 
 /// Cells of one level that may lie in a row in a region: along the diagonal of its largest patch, or of the largest page.
 double longest_run(const DomainGeometry& geometry) {

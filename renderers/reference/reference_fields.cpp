@@ -3,22 +3,27 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 namespace amrtex {
 namespace {
 
 /// Where f passes a knot of its transfer function, or has an extremum on a logarithmic axis, as places of the ray.
 void add_breaks(const PieceFunction& f, const RaySpan& span, const TransferTable& table, std::vector<double>& breaks) {
-  const auto break_at = [&](const auto& places, int n) {
-    for (int i = 0; i < n; ++i) breaks.push_back(span.from + places[static_cast<std::size_t>(i)] * span.length());
+  const auto break_at = [&](std::span<const double> places) {
+    for (const double place : places) breaks.push_back(span.from + place * span.length());
   };
+  const auto first = [](const auto& places, int n) { return std::span<const double>(places.data(), static_cast<std::size_t>(n)); };
   const std::size_t last = table.segment_of(f.upper);
   for (std::size_t k = table.segment_of(f.lower); k < last; ++k) {
     std::array<double, 3> roots{};
-    break_at(roots, roots_in_unit(f.minus(table.knots()[k]), roots));
+    const int n = roots_in_unit(f.minus(table.knots()[k]), roots);
+    break_at(first(roots, n));
   }
+  if (!table.logarithmic()) return;
   std::array<double, 2> extrema{};
-  if (table.logarithmic()) break_at(extrema, extrema_in_unit(f.numerator, extrema));
+  const int n = extrema_in_unit(f.numerator, extrema);
+  break_at(first(extrema, n));
 }
 
 void sort_places(std::vector<double>& places) {

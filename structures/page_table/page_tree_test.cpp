@@ -2,7 +2,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "structures/generators/synthetic.hpp"
 #include "structures/page_table/page_table_plan.hpp"
 #include "structures/page_table/page_writer.hpp"
 #include "tests/leave_out_cases.hpp"
@@ -50,10 +49,9 @@ TEST(Division, IsThePartitionThatRefinedBoxesTell) {
         volume += static_cast<double>(inside.cells()) * std::pow(h.cell_width(p.level), 3);
       }
       const Vec3d finest(h.cells(h.finest_level()));
-      if (pages_without_mesh(division) == 0)
-        EXPECT_EQ(volume, finest.x * finest.y * finest.z) << mesh.name;
-      else
-        EXPECT_LT(volume, finest.x * finest.y * finest.z) << mesh.name;
+      const double all = finest.x * finest.y * finest.z;
+      EXPECT_LE(volume, all) << mesh.name;
+      EXPECT_EQ(pages_without_mesh(division) == 0, volume == all) << mesh.name;
     }
 }
 
@@ -111,7 +109,7 @@ TEST(TableTree, HasTheEntriesOfTheOneLevelTable) {
     write_table(h, plan, pages, field);
     field.integer_uniforms = {{"u_page_table", Vec3i(plan.entry_width, 0, 0)}};
     field.shader.defines = {{"AMRTEX_PAGE_ENTRY_WORDS", plan.entry_words()}};
-    if (h.cells(h.finest_level()).x > 16) EXPECT_GT(plan.levels(), 1);
+    EXPECT_EQ(plan.levels() > 1, one.statistics["table_entries"] > 8);
     for_each_cell(h.domain(h.finest_level()).coarsened(2), [&](const Vec3i& c) {
       const Vec3i cell = glm::min(c * 2, h.cells(h.finest_level()) - Vec3i(1));
       EXPECT_EQ(red_at(field, cell), red_at(one, cell));
@@ -138,7 +136,7 @@ void expect_holds_the_field(const AmrHierarchy& h, int page_size, std::int64_t m
 
 TEST(TableTree, DeepCornersCostWhatTheyHold) {
   // each level but the finest has 4^3 - 2^3 leaves, and at most (4 + 1)^3 pages of 4^3 cells about them: 64 pages a level
-  for (const int levels : {13, 16, 20, 28}) {
+  for (const int levels : {13, 20, 28}) {
     const AmrHierarchy h = deep_corner(levels);
     ASSERT_EQ(h.leaf_cells(), (levels - 1) * 56 + 64);
     SCOPED_TRACE(levels);
@@ -150,7 +148,7 @@ TEST(TableTree, DeepCornersCostWhatTheyHold) {
 }
 
 TEST(TableTree, TakesRatiosOfAnyKind) {
-  std::vector<int> ratios{2, 3, 5, 2, 7, 4, 3, 2, 11, 2, 4};
+  std::vector<int> ratios{2, 3, 5, 2, 4, 3, 2, 5, 2};
   MeshBuilder mesh(Vec3i(6), ratios);
   mesh.root(waves);
   Box box{Vec3i(2), Vec3i(4)};
@@ -163,16 +161,14 @@ TEST(TableTree, TakesRatiosOfAnyKind) {
 }
 
 TEST(TableTree, PagesMayBeWiderThanTheDomain) {
-  // a page of level 0 of 128 cells of 2^24 finest ones: 2^31, which no int of the shader holds
-  const AmrHierarchy h(generate_mesh({{"field", {{"type", "linear"}, {"gradient", {1, 2, 3}}}},
-                                      {"levels", 25},
-                                      {"root", 64},
-                                      {"patch", 4},
-                                      {"refine", "nested"}}));
-  const auto positions = probe_positions(h, 3);
-  const EncodedField field = build(h, page_case(Filter::nearest, 64), {.storage = Storage::r64f});
-  const Comparison result = compare_double(h, field, positions);
-  EXPECT_TRUE(result) << result;
+  // 2 root cells of 2^28 finest ones: a page of 8 cells is 2^31 wide, which no int of the shader holds
+  const AmrHierarchy h = deep_corner(29, 2);
+  const auto positions = probe_positions(h, 2);
+  for (const Filter filter : kAllFilters) {
+    const EncodedField field = build(h, page_case(filter, 8), {.storage = Storage::r64f});
+    const Comparison result = compare_double(h, field, positions);
+    EXPECT_TRUE(result) << filter_name(filter) << ": " << result;
+  }
 }
 
 TEST(TableTree, WideDomainsCostWhatTheyHold) {
