@@ -165,11 +165,11 @@ TEST(Clip, ByAPlaneThroughNothingChangesNoBit) {
         make_surfaces(scene);
         const Picture whole = render_on_cpu(h, field, scene, false);
         const bool drawn = mode == Mode::dvr && sampling == Sampling::lattice && on_gl.has(c);
-        const Picture on_gl = drawn ? draw(context(ContextKind::egl), h, field, scene) : Picture();
+        const Picture by_gl = drawn ? draw(context(ContextKind::egl), h, field, scene) : Picture();
         scene.settings.clip_planes = {{{0.3, 1, 0.2}, -4}, {{0, -2, 0}, -2.5}};
         EXPECT_EQ(render_on_cpu(h, field, scene, false).values, whole.values);
         if (drawn) {
-          EXPECT_EQ(draw(context(ContextKind::egl), h, field, scene).values, on_gl.values);
+          EXPECT_EQ(draw(context(ContextKind::egl), h, field, scene).values, by_gl.values);
         }
       }
   });
