@@ -148,7 +148,7 @@ Json one_point() { return with(small_experiment(), "encodings", {{{"name", "page
 
 TEST_F(CommandLine, EveryCommandHasHelpWithAnExample) {
   for (const std::string command : {"encodings", "doctor", "info", "generate", "convert", "sample", "structure", "render", "run",
-                                    "report", "verify", "advise", "settings"}) {
+                                    "report", "compare", "merge", "verify", "advise", "settings"}) {
     const Result r = amrtex({command, "--help"});
     EXPECT_EQ(r.exit_code, 0) << command;
     EXPECT_THAT(r.out, HasSubstr("Example: amrtex " + command));
@@ -807,6 +807,22 @@ TEST_F(CommandLine, ReportMakesTheTablesFromRecordsAlone) {
   write_text(at("columns.json"), R"(["encoding", "totl"])");
   expect_complaint(amrtex({"report", at("out"), "--columns", at("columns.json")}), 2,
                    AllOf(HasSubstr("totl"), HasSubstr("total")));
+}
+
+TEST_F(CommandLine, CompareAndMergeTakeWhatRunWrote) {
+  const std::string out = at("out"), all = at("all");
+  counts_of_run(small_experiment());
+  const Result itself = amrtex({"compare", out, out, "--exit-code"});
+  EXPECT_EQ(itself.exit_code, 0) << itself.err;
+  EXPECT_THAT(itself.out, AllOf(HasSubstr("3 points with times"), HasSubstr("n too small: 1 against 1 cannot decide 3 rows"),
+                                HasSubstr("0 exact values differ"), HasSubstr("that can decide 3 points: 5")));
+  EXPECT_EQ(json_of({"merge", all, out, "--json"}), Json({{"added", 3}, {"present", 0}, {"renumbered", 0}}));
+  EXPECT_EQ(json_of({"merge", all, out, "--json"}).at("present"), 3);
+  EXPECT_EQ(json_of({"compare", out, all, "--json"}).at("findings"), false);
+  EXPECT_EQ(amrtex({"report", all}).exit_code, 0);
+  expect_complaint(amrtex({"compare", out, at("nowhere")}), 2, HasSubstr("nowhere"));
+  expect_complaint(amrtex({"merge", all, at("nowhere")}), 1, HasSubstr("nowhere"));
+  expect_complaint(amrtex({"compare", out, all, "--effect", "-1"}), 2, HasSubstr("a share from 0 to 1"));
 }
 
 TEST_F(CommandLine, TablesBesideAPaperFollowTheOrdinaryOnes) {

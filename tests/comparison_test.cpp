@@ -17,6 +17,7 @@
 #include "bench/records/record.hpp"
 #include "bench/records/record_file.hpp"
 #include "bench/report/compare.hpp"
+#include "bench/report/repetitions.hpp"
 #include "bench/report/report.hpp"
 #include "structures/mesh/error.hpp"
 
@@ -571,8 +572,9 @@ TEST(CompareFolders, ProcessesWhoseBaselineDriftedDoNotCount) {
   for (const ComparedPoint& p : c.result.points) {
     EXPECT_EQ(p.relative->n_a, 8u);
     EXPECT_EQ(p.relative->n_b, 3u);
-    if (p.verdict == Verdict::cannot_tell)
+    if (p.verdict == Verdict::cannot_tell) {
       EXPECT_THAT(p.reason, HasSubstr("baselines drifted by more than 15 % in 0 of 8 repetitions of A and 5 of 8 of B"));
+    }
   }
 }
 
@@ -592,7 +594,9 @@ TEST(CompareFolders, WhatIsExactComesFirst) {
                                                              "/image_hash", "status"));
   for (const Difference& d : c.result.differences) {
     EXPECT_TRUE(d.counts);
-    if (d.what == "status") EXPECT_EQ(d.b, "1 failed, 7 ok");
+    if (d.what == "status") {
+      EXPECT_EQ(d.b, "1 failed, 7 ok");
+    }
   }
   EXPECT_EQ(comparison_tables(c.result).front().title, "what differs");
   EXPECT_TRUE(has_findings(c.result));
@@ -796,7 +800,28 @@ TEST_F(Merging, TellsOfATornLine) {
   EXPECT_THAT(result.warnings, SizeIs(1));
 }
 
-// --- contexts in tables ---
+// --- repetitions and contexts in tables ---
+
+TEST(RepetitionsInTables, AreOneRowWithTheMedianOfProcesses) {
+  std::vector<Json> records = {small(0, 1), small(1, 4), small(2, 2), record("octree", 0, 7, 10, 10)};
+  records.push_back(elsewhere(small(0, 9)));
+  const std::vector<Json> ones = one_a_point(records);
+  ASSERT_THAT(ones, SizeIs(3));
+  EXPECT_EQ(ones[0]["frame"]["wall_ms"]["median"], 2);
+  EXPECT_EQ(ones[0]["frame"]["wall_ms"]["n"], 3);
+  EXPECT_EQ(ones[0]["frame"]["relative"], 0.2);
+  EXPECT_NO_THROW(validate_record(ones[0]));
+  EXPECT_EQ(ones[1], records[3]) << "one alone stays as it is";
+  EXPECT_EQ(ones[2], records[4]);
+}
+
+TEST(RepetitionsInTables, OfWhichOneFailedAreAFailure) {
+  std::vector<Json> records = {small(0, 1), small(1, 4)};
+  records[1]["status"] = "failed";
+  records[1]["reason"] = "a crash";
+  records[1]["frame"] = nullptr;
+  EXPECT_EQ(one_a_point(records)[0]["reason"], "in 1 of 2 repetitions: a crash");
+}
 
 TEST(ContextsInTables, OfOneRendererAreToldApart) {
   std::vector<Json> records = {small(0, 1), small(0, 2), small(0, 3)};

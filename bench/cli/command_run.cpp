@@ -15,6 +15,7 @@
 #include "bench/records/point_query.hpp"
 #include "bench/records/record.hpp"
 #include "bench/report/paper_tables.hpp"
+#include "bench/report/repetitions.hpp"
 #include "bench/report/report.hpp"
 #include "bench/report/scatter.hpp"
 #include "bench/report/work_precision.hpp"
@@ -40,7 +41,7 @@ struct Arguments : RunArguments {
 };
 
 std::vector<Table> tables_of(const fs::path& folder, const std::string& columns) {
-  const std::vector<Json> records = load_records(folder);
+  const std::vector<Json> records = one_a_point(load_records(folder));
   if (records.empty()) throw Error(fmt::format("{}: no records; accepted: a folder that `amrtex run` wrote", folder.string()));
   ReportOptions options;
   if (columns.empty() && fs::exists(folder / "columns.json")) return tables_of(folder, (folder / "columns.json").string());
@@ -69,7 +70,7 @@ std::vector<Table> write_report(const fs::path& folder, const std::string& colum
   write_tables(folder, tables);
   const fs::path file = folder / "tables.json";
   if (!fs::exists(file)) return tables;
-  const std::vector<Json> records = load_records(folder);
+  const std::vector<Json> records = one_a_point(load_records(folder));
   for (Table& table : make_paper_tables(file, records)) tables.push_back(std::move(table));
   const auto add = [&](const auto& made) {
     tables.insert(tables.end(), made.tables.begin(), made.tables.end());

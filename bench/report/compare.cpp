@@ -14,6 +14,7 @@
 #include "bench/records/record.hpp"
 #include "bench/records/record_file.hpp"
 #include "bench/report/contexts.hpp"
+#include "bench/report/repetitions.hpp"
 #include "bench/report/report.hpp"
 #include "structures/mesh/error.hpp"
 #include "structures/mesh/quoted.hpp"
@@ -42,9 +43,6 @@ std::optional<double> above_zero(const Json& value) {
 
 // --- one side ---
 
-/// Of one point in one context.
-using Repetitions = Records;
-
 /// One folder by context and configuration, both in the order of the records.
 struct Side {
   std::string name;
@@ -59,16 +57,6 @@ std::string context_for_all(const std::vector<Json>& records) {
   for (const Json& record : records)
     if (const std::string key = context_key(value_at(record, "/context")); !key.empty()) keys.insert(key);
   return keys.size() == 1 ? *keys.begin() : "";
-}
-
-/// A folder may hold repetitions of an older program, which a later run did not replace: a point's are those of the program that
-/// measured it last. Returns how many are left out.
-std::size_t keep_last_program(Repetitions& point) {
-  const Json* last = point.front();
-  for (const Json* record : point)
-    if (text_at(*record, "/context/date") >= text_at(*last, "/context/date")) last = record;
-  const Json program = value_at(*last, "/implementation");
-  return std::erase_if(point, [&](const Json* record) { return value_at(*record, "/implementation") != program; });
 }
 
 void keep_last_programs(Side& side, std::vector<std::string>& notes) {
@@ -132,12 +120,6 @@ std::vector<ContextPair> context_pairs(const Side& a, const Side& b, std::vector
 }
 
 // --- what is exact ---
-
-const Json& representative(const Repetitions& point) {
-  for (const Json* record : point)
-    if (text_at(*record, "/status") == status_name(Status::ok)) return *record;
-  return *point.front();
-}
 
 /// The one value of all repetitions, or a list of those there are; null where none has one.
 Json value_of(const Repetitions& point, const char* pointer) {
