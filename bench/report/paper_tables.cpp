@@ -13,6 +13,7 @@
 
 #include "bench/records/record.hpp"
 #include "bench/records/record_conditions.hpp"
+#include "bench/report/contexts.hpp"
 #include "bench/report/report.hpp"
 #include "bench/settings/json_file.hpp"
 #include "structures/mesh/quoted.hpp"

@@ -11,7 +11,7 @@
 
 namespace amrtex {
 
-/// A table for each entry of the file and each renderer of the records; without records
+/// A table for each entry of the file and each context of the records; without records
 /// the file is only checked. Throws UsageError naming file, line and key, also where
 /// records of different values match one row.
 std::vector<Table> make_paper_tables(const std::filesystem::path& path, std::span<const Json> records);

@@ -12,7 +12,7 @@
 namespace amrtex {
 
 struct Scatter {
-  std::vector<Table> tables;  ///< one for each entry and renderer
+  std::vector<Table> tables;  ///< one for each entry and context
   std::vector<Diagram> diagrams;
 };
 

@@ -12,7 +12,7 @@
 namespace amrtex {
 
 /// A scene is what may be compared: data set, view, transfer function, mode, size, lamp and surfaces, and the filter that errors
-/// are measured against. For each scene and renderer: the fastest setting that reaches each error asked for, the front that no
+/// are measured against. For each scene and context: the fastest setting that reaches each error asked for, the front that no
 /// setting beats, the points without a time and why, and a diagram.
 struct WorkPrecision {
   std::vector<Table> tables;
