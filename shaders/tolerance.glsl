@@ -433,10 +433,12 @@ void march_tolerance_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, I
         if (way > AMRTEX_SHORTEST_PIECE * real(r.width)) p.off = off_cubic(a, r, p, q0 + dq * (t + way * real(0.5)));
         real done = march_piece(a, p, begin + t, way, least);
         has_from = has_from && done == real(1);
-        longest = done < real(1) ? way * real(0.25) : way * real(2);
+        longest = done < real(1) ? way * real(0.25) : max(longest, way * real(2));
         way *= done;
       } else if (valued) {
         march_piece(a, p, begin + t, way, least);
+      } else {
+        longest = length;
       }
       t = t + way;
     }
