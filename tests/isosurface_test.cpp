@@ -176,7 +176,7 @@ const View kRising = orthographic(Vec3d(0.5), {1, 0.3, 0.2}, 0.6);
 TEST(Hit, NextToAnEndOfTheRayIsFound) {
   const AmrHierarchy h = MeshBuilder(Vec3i(4)).root(along_y).hierarchy();
   for_each_accepted([&](const EncodingCase& c) {
-    if (!holds_linear(c.filter)) return;
+    if (!interpolating(c)) return;
     const EncodedField doubles = in_double(h, c);
     for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive})
       for (const double step : {0.5, 2.0}) {
@@ -191,7 +191,7 @@ TEST(Hit, NextToAGapIsFound) {
   for (const bool hole : {true, false}) {
     const AmrHierarchy h = with_gap(hole);
     for_each_accepted([&](const EncodingCase& c) {
-      if (!holds_linear(c.filter)) return;
+      if (!interpolating(c)) return;
       const EncodedField doubles = in_double(h, c);
       for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive}) {
         const Scene scene = iso_scene(kRising, {0.5}, Output::depth, sampling);
@@ -203,8 +203,7 @@ TEST(Hit, NextToAGapIsFound) {
 
 TEST(Hit, NextToAnEndOrAGapIsFoundOnGl) {
   const AmrHierarchy h = with_gap(true);
-  for_each_encoding([&](const EncodingCase& c) {
-    if (!holds_linear(c.filter)) return;
+  GlPairs(2, interpolating).for_each([&](const EncodingCase& c) {
     const EncodedField field = build(h, c);
     for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive}) {
       const Scene scene = iso_scene(kRising, {0.5}, Output::depth, sampling);
@@ -227,7 +226,7 @@ TEST(Hit, IsWhereTheReferenceHasOneWhateverTheRegionThatARayEnters) {
   for (const MeshBuilder& mesh : {nested(rising), jump_of_two(rising), holes_and_missing(rising)}) {
     const AmrHierarchy h = mesh.hierarchy();
     for_each_accepted([&](const EncodingCase& c) {
-      if (!holds_linear(c.filter)) return;
+      if (!interpolating(c)) return;
       const EncodedField doubles = in_double(h, c);
       for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive}) {
         const Scene scene = iso_scene(kRising, {0.55}, Output::depth, sampling);

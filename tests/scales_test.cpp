@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "bench/measure/runner.hpp"
+#include "bench/measure/scene_data.hpp"
 #include "bench/measure/value_resolution.hpp"
 #include "bench/numbers/image_error.hpp"
 #include "bench/settings/experiment.hpp"
@@ -203,7 +203,7 @@ TEST(Values, OfAnyScaleAreDrawnOnGl) {
   for (const Ramp& ramp : {kRamps[1], kRamps[4], kRamps[5]}) {
     const AmrHierarchy h = ramp.mesh();
     SCOPED_TRACE(name_of(ramp));
-    for_each_chosen([&](const EncodingCase& c) {
+    GlPairs(2).for_each([&](const EncodingCase& c) {
       const EncodedField field = build(h, c);
       expect_opacities(draw(gl, h, field, light_scene(ramp)), c.filter, ramp);
       expect_values(draw(gl, h, field, columns(Mode::mip)), c.filter, ramp);
@@ -406,7 +406,7 @@ TEST(ThinCells, HaveTheThicknessThatTheyHaveAtAnyAspect) {
       SCOPED_TRACE(fmt::format("aspect {} {}", aspect, sampling_name(sampling)));
       for_each_filter(
           [&](const EncodingCase& c) { EXPECT_LE(thin_error(render_on_cpu(h, build(h, c), scene, false), scene, h), 1e-5); });
-      for_each_chosen([&](const EncodingCase& c) {
+      GlPairs(2).for_each([&](const EncodingCase& c) {
         if (aspect != 1e4 && aspect != 1e6) return;
         EXPECT_LE(thin_error(draw(gl, h, build(h, c), scene), scene, h), 1e-5);
       });
