@@ -11,7 +11,7 @@
 #include <random>
 
 #include "bench/measure/reference_cache.hpp"
-#include "bench/measure/runner.hpp"
+#include "bench/measure/scene_data.hpp"
 #include "bench/settings/experiment.hpp"
 #include "bench/verify/pictures.hpp"
 #include "bench/verify/stiff_media.hpp"
