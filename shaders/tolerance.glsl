@@ -119,7 +119,8 @@ real mean_place(IN(real) k_near, IN(real) k_far, IN(real) depth) {
     return mean - depth * real(0.5) * (real(1) - squares - mean);
   }
   vec3r place = vec3r(0.1127016653792583, 0.5, 0.8872983346207417);
-  vec3r weight = vec3r(5, 8, 5) * (vec3r(linear) + place * (real(2) * square)) * exp(place * (vec3r(linear) + place * square) * -depth);
+  real seen = min(depth, real(64));  // beyond, all weights would be 0; the first one is the nearest in any case
+  vec3r weight = vec3r(5, 8, 5) * (vec3r(linear) + place * (real(2) * square)) * exp(place * (vec3r(linear) + place * square) * -seen);
   return dot(place, weight) / (weight.x + weight.y + weight.z);
 }
 

@@ -220,8 +220,11 @@ TEST(Stiff, LightIsExactAndMonotoneForTheExponentialRules) {
             }
             continue;
           }
-          EXPECT_NEAR(opacity, -std::expm1(-k), 1e-12) << k;
-          EXPECT_NEAR(picture.pixel(0, 0)[0], -0.75 * std::expm1(-k), 1e-12) << k;
+          // by tolerance a ray may end, between two cells, where a tenth of the tolerance is left
+          const double least = integrator == Integrator::tolerance ? 0.1 * scene.settings.tolerance : 0;
+          const double left = std::exp(-k) < least ? least : 0;
+          EXPECT_NEAR(opacity, -std::expm1(-k), 1e-12 + left) << k;
+          EXPECT_NEAR(picture.pixel(0, 0)[0], -0.75 * std::expm1(-k), 1e-12 + left) << k;
           EXPECT_GE(opacity, before);
           EXPECT_LE(opacity, 1);
           before = opacity;
