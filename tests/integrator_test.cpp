@@ -220,8 +220,11 @@ TEST(Stiff, LightIsExactAndMonotoneForTheExponentialRules) {
             }
             continue;
           }
-          EXPECT_NEAR(opacity, -std::expm1(-k), 1e-12) << k;
-          EXPECT_NEAR(picture.pixel(0, 0)[0], -0.75 * std::expm1(-k), 1e-12) << k;
+          // by tolerance a ray may end, between two cells, where a tenth of the tolerance is left
+          const double least = integrator == Integrator::tolerance ? 0.1 * scene.settings.tolerance : 0;
+          const double left = std::exp(-k) < least ? least : 0;
+          EXPECT_NEAR(opacity, -std::expm1(-k), 1e-12 + left) << k;
+          EXPECT_NEAR(picture.pixel(0, 0)[0], -0.75 * std::expm1(-k), 1e-12 + left) << k;
           EXPECT_GE(opacity, before);
           EXPECT_LE(opacity, 1);
           before = opacity;
@@ -410,8 +413,6 @@ TEST(Tolerance, IsReachedByEveryStructureWithWideAndNarrowCurves) {
           std::pair{"octree", Filter::linear_lod}, std::pair{"uniform", Filter::linear_page}}) {
       const EncodedField field = build(h, a_case(encoding, filter));
       for (const Curve& curve : curves()) {
-        // narrow peaks between its finest cells' estimates are missed at 1e-2 (experiments/tolerance)
-        if (encoding == std::string_view("uniform") && curve.name == std::string_view("shells")) continue;
         SCOPED_TRACE(fmt::format("{} {} {}", scene_case.mesh, encoding, curve.name));
         Scene scene = scene_of(Integrator::tolerance, scene_case.view, Sampling::adaptive, 32);
         scene.transfer_function = curve.light;
