@@ -104,16 +104,6 @@ void expect_values(const Picture& picture, Filter filter, const Ramp& ramp) {
             tolerance_of(ramp));
 }
 
-/// The same texels as the values' own floats: what r32f was without units.
-EncodedField as_plain_floats(EncodedField field) {
-  for (HostTexture& t : field.textures) {
-    if (!t.holds_values) continue;
-    for (std::int64_t i = 0; i < t.texels(); ++i) t.as<float>()[i] = static_cast<float>(field.scale.value(t.as<float>()[i]));
-  }
-  field.scale = {};
-  return field;
-}
-
 TEST(Units, ArePlainForOrdinaryFieldsAndFollowFromValuesAlone) {
   // b is a power of two, and numbers are normal floats
   for (const auto& [min, max, least] :
