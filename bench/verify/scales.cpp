@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "bench/verify/pictures.hpp"
+#include "bench/verify/thin_cells.hpp"
 #include "bench/verify/verify.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
 
@@ -26,22 +27,12 @@ Picture on_cpu(VerifyContext& v, const AmrHierarchy& h, const EncodingCase& c, c
   return render_on_cpu(h, v.build(h, c), scene, false);
 }
 
-/// A constant 2 in flat cells, seen at some 45 degrees: 2 L of each ray's chord L.
 void thin_cells(VerifyContext& v) {
   for (const double aspect : {1e2, 1e4, 1e6}) {
-    const double edge = 8 * aspect;
-    const AmrHierarchy h = MeshBuilder({8, 8, 1}, {}, Vec3d(0), {edge, edge, 1}).root(constant(2)).hierarchy();
-    Scene scene = small_scene(Mode::projection, {}, Sampling::lattice, 6);
-    scene.view.eye = {1.5 * edge, 0.5 * edge, edge};
-    scene.view.at = {0.5 * edge, 0.5 * edge, 0.5};
-    scene.view.up = {0, 1, 0};
-    scene.view.orthographic = true;
-    scene.view.height = 0.6 * edge;
-    scene.settings.step = 0.5;
-    v.for_each_filter(fmt::format("19 cells {:.0e} times as wide as high: thickness", aspect), [&](const EncodingCase& c) {
-      const auto exact = [&](int x, int y) { return 2 * chord(scene, x, y, h.domain_lower(), h.domain_upper()); };
-      return at_most(relative_error(on_cpu(v, h, c, scene), 0, exact), 1e-5);
-    });
+    const AmrHierarchy h = thin_mesh(aspect);
+    const Scene scene = thin_scene(aspect, Sampling::lattice);
+    v.for_each_filter(fmt::format("19 cells {:.0e} times as wide as high: thickness", aspect),
+                      [&](const EncodingCase& c) { return at_most(thin_error(on_cpu(v, h, c, scene), scene, h), 1e-5); });
   }
 }
 
