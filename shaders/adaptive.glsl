@@ -133,16 +133,13 @@ void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
       length = max((more ? next : ray.length) - t, ray_real(0));
       skipped = !inside || region_invisible(a, r);
       count_region(a, skipped);
-      if (skipped) {
-        pass_region(a, inside, r, t, next, next);
-        front.part = part = real(0.5);
-      }
+      if (skipped) pass_region(a, inside, r, next);
       t = next;
       bool x = exits.x <= min(exits.y, exits.z);
       bool y = !x && exits.y <= exits.z;
       p = leave_region(ray, r, t, bvec3(x, y, !x && !y));
       more = more && all(greaterThanEqual(p.cell, ivec3(0))) && all(lessThan(p.cell, u_domain_cells));
-    } while (skipped && more && !ray_stopped(a));
+    } while (skipped && more);
     if (AMRTEX_SKIPS_IN_STAGES && !skipped) open_region(r);
     vec3r f = vec3r(ray_vec3(front.p.cell - r.lower) + ray_vec3(front.p.fraction));  // as exact as the ray before it is rounded
     if (!skipped && length > ray_real(0)) front.part = march_adaptive_region(a, r, f, direction, real(length), front.t, part, ray.phase);

@@ -1,7 +1,6 @@
 // Isosurfaces on the sampler contract: where a ray crosses one, and what it adds to the picture.
 // A hit is a change of side of f - isovalue between consecutive samples that both have a value,
-// across regions too. Entering or leaving the mesh is none; but what lies between the border of the mesh and the sample next to it
-// counts, and so does what lies between a sample and an end of the ray.
+// across regions too. Entering or leaving the mesh is none. A ray has samples at its two ends as well.
 DEFINE_INT(AMRTEX_ISOVALUES)  // how many isosurfaces are drawn; 0 leaves out what they need
 #if AMRTEX_CPP || AMRTEX_ISOVALUES > 0
 DEFINE_INT(AMRTEX_OUTPUT)               // one of the AMRTEX_OUTPUT_... below
@@ -42,16 +41,10 @@ bool on_one_side(IN(Accumulation) a, IN(vec2r) value_range) {
   return lower == isovalues_below(value_range.y) && (a.below < 0 || a.below == lower);
 }
 
-// Where cells may be missing a ray enters and leaves the mesh between two samples. The side there is asked for outside of the loop over
-// samples, as surfaces are drawn. Rays that only look for surfaces go without.
-#define AMRTEX_GAPS (AMRTEX_VALIDITY != 0)
-
-// Takes the side of a sample at `at`, whose interval begins at `begin`; or notes that a surface, or the border of the mesh, lies
-// before it.
+// Takes the side of a sample at `at`, whose interval begins at `begin`; or notes that a surface lies before it.
 void note_side(INOUT(Accumulation) a, IN(bool) missing, IN(real) value, IN(ray_real) begin, IN(ray_real) at) {
   int below = missing ? -1 : isovalues_below(value);
-  bool border = AMRTEX_GAPS && !a.probing && (a.below < 0) != (below < 0);
-  a.crossing = border || (a.below >= 0 && below >= 0 && a.below != below);
+  a.crossing = a.below >= 0 && below >= 0 && a.below != below;
   a.beyond = below;
   a.after = at;
   a.between = begin;
@@ -60,25 +53,18 @@ void note_side(INOUT(Accumulation) a, IN(bool) missing, IN(real) value, IN(ray_r
   a.before = at;
 }
 
-// The first crossing of an isovalue between two samples, or of the border of the mesh.
+// The first crossing of an isovalue between two samples.
 STRUCT Crossing {
-  bool found;         // false: one end has no value after all, or the one before the border
-  ray_real t;         // units of ray length; of a border on its inner side
+  bool found;         // false: one end has no value after all
+  ray_real t;         // units of ray length
   real value_before;  // of f at the two ends
   real value_after;
-};
-
-// What is looked for between the last sample and the next.
-STRUCT Sought {
-  bool border;    // of the mesh, and no isovalue
-  bool rising;    // does the value pass the isovalue upwards? Of a border: is the mesh entered there?
-  real isovalue;
 };
 
 // Bisection through sample_field, then one secant: for a jump of f the last bracket, for a
 // smooth f far better. One loop, its first two turns the ends: a shader holds the encoding's
 // text once for each place that samples.
-Crossing find_crossing(IN(Ray) ray, IN(Accumulation) a, IN(Sought) sought) {
+Crossing find_crossing(IN(Ray) ray, IN(Accumulation) a, IN(real) isovalue, IN(bool) rising) {
   Crossing c;
   c.found = true;
   c.value_before = real(0);
@@ -91,9 +77,8 @@ Crossing find_crossing(IN(Ray) ray, IN(Accumulation) a, IN(Sought) sought) {
     ray_real t = i == 0 ? from : (i == 1 ? to : (from + to) * ray_real(0.5));
     FieldSample s;
     bool has_value = sample_field(make_position(ray.entry + ray.direction * t), s);
-    bool passed = sought.border ? has_value == sought.rising : has_value && (s.value >= sought.isovalue) == sought.rising;
-    bool beyond = i == 1 || (i > 1 && passed);
-    if (i < 2) c.found = c.found && (has_value || (sought.border && sought.rising == (i == 0)));
+    bool beyond = i == 1 || (i > 1 && has_value && (s.value >= isovalue) == rising);
+    if (i < 2) c.found = c.found && has_value;
     if (i == 0) c.value_before = s.value;
     if (i == 1) c.value_after = s.value;
     from = beyond ? from : t;
@@ -101,13 +86,8 @@ Crossing find_crossing(IN(Ray) ray, IN(Accumulation) a, IN(Sought) sought) {
     to = beyond ? t : to;
     high = beyond ? s.value : high;
   }
-  if (sought.border) {
-    c.t = sought.rising ? to : from;
-    c.value_before = c.value_after = sought.rising ? high : low;
-    return c;
-  }
   real rise = high - low;
-  real part = rise == real(0) || is_no_value(rise) ? real(0.5) : clamp((sought.isovalue - low) / rise, real(0), real(1));
+  real part = rise == real(0) || is_no_value(rise) ? real(0.5) : clamp((isovalue - low) / rise, real(0), real(1));
   c.t = from + (to - from) * ray_real(part);
   return c;
 }
@@ -306,45 +286,13 @@ void composite_surface(IN(Ray) ray, INOUT(Accumulation) a, IN(Position) p, IN(in
   a.transmittance = transmittance;
 }
 
-// What the ray knows behind a border of the mesh. False: a surface lies before it, where the ray leaves the mesh.
-bool pass_border(INOUT(Accumulation) a, IN(Crossing) c) {
-  bool enters = a.below < 0;
-  int side = isovalues_below(c.value_before);
-  if (c.found && !enters && side != a.below) {
-    a.beyond = side;
-    a.after = c.t;
-    return false;
-  }
-  // from the border on, or the sample behind it
-  a.below = enters && c.found ? side : a.beyond;
-  a.before = enters && c.found ? c.t : a.after;
-  a.crossing = false;
-  return true;
-}
-
-// The surface between the last sample and the next: of the isovalue that is crossed first. Or what a border of the mesh changes.
+// The surface between the last sample and the next: of the isovalue that is crossed first.
 void draw_surface(IN(Ray) ray, INOUT(Accumulation) a) {
-  Sought sought;
-  Crossing c;
-  int k = 0;
-  bool leaves = false;
-  bool more = true;
-  do {  // a surface before a border is found in a second turn
-    sought.border = AMRTEX_GAPS && (a.below < 0 || a.beyond < 0);
-    sought.rising = a.beyond > a.below;
-    k = sought.border ? 0 : (sought.rising ? a.below : a.below - 1);
-    sought.isovalue = u_isovalues[k];
-    c = find_crossing(ray, a, sought);
-    more = sought.border;
-    if (sought.border) {
-      if (pass_border(a, c)) return;
-      leaves = true;
-    }
-  } while (more);
-  bool rising = sought.rising;
+  bool rising = a.beyond > a.below;
+  int k = rising ? a.below : a.below - 1;
+  Crossing c = find_crossing(ray, a, u_isovalues[k], rising);
   a.crossing = false;
-  a.below = c.found ? a.below + (rising ? 1 : -1) : a.beyond;
-  a.before = c.found ? a.before : a.after;
+  a.below = c.found ? a.below + (rising ? 1 : -1) : -1;
   if (!c.found) return;
   Position p = make_position(ray.entry + ray.direction * c.t);
   if (AMRTEX_OUTPUT == AMRTEX_OUTPUT_DEPTH) a.surface = vec4r(real(ray.start + c.t) * u_length_unit, real(0), real(0), real(1));
@@ -353,7 +301,7 @@ void draw_surface(IN(Ray) ray, INOUT(Accumulation) a) {
     a.surface[AMRTEX_MIRROR_AXIS] = -a.surface[AMRTEX_MIRROR_AXIS];
   if (AMRTEX_OUTPUT != AMRTEX_OUTPUT_COLOR) return;
   // the part of an interval between its end and the surface is moved to the other side of it
-  real shift = leaves ? min(real(c.t - a.between), real(0)) : real(c.t - a.between);
+  real shift = real(c.t - a.between);
   real value = shift > real(0) ? c.value_after : c.value_before;
   vec2r lit = vec2r(1);  // of the surface, and of the sample whose interval is split
 #if AMRTEX_CPP || AMRTEX_SHADOWS

@@ -199,13 +199,9 @@ int march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) f
         skipped = !inside || region_invisible(a, r);
         if (skipped || !stencils) i = lattice_exit(block, inverse_step, r, i, count);
         count_region(a, skipped);
-        if (skipped) {
-          pass_region(a, inside, r, lattice_place(block, real(first)), lattice_place(block, real(first) + real(0.5)),
-                      lattice_place(block, real(i) - real(0.5)));
-          if (AMRTEX_ISOVALUES != 0 && a.crossing) i = first;
-        }
+        if (skipped) pass_region(a, inside, r, lattice_place(block, real(i) - real(0.5)));
         if (AMRTEX_PREINTEGRATED && skipped && inside) pass_points(a, block, r, first, i);
-      } while (skipped && i < count && !ray_stopped(a));
+      } while (skipped && i < count);
       if (AMRTEX_SKIPS_IN_STAGES && !skipped) open_region(r);
       if (stencils && !skipped) i = march_lattice_stencil(a, block, r, first, count);
       if (!stencils && !skipped) i = march_lattice_region(a, block, r, first, i);
@@ -239,7 +235,6 @@ void march_lattice_point(INOUT(Accumulation) a, IN(Ray) ray, IN(int) whole, IN(r
   bool skipped = !inside || (region_invisible(a, r) && !AMRTEX_PREINTEGRATED);
   count_region(a, skipped);
   if (!skipped) take_lattice_point(a, block, r, start, at, length);
-  if (AMRTEX_ISOVALUES != 0 && !inside) note_side(a, true, real(0), start, at);
   if (AMRTEX_PREINTEGRATED && skipped) take_point(a, true, real(0), length);
 }
 

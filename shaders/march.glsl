@@ -26,11 +26,6 @@ void note_ray_end(IN(Ray) ray, INOUT(Accumulation) a, IN(bool) exit) {
   if (AMRTEX_LATTICE != 0) p.fraction = (floor(p.fraction * AMRTEX_QUANTA) + real(0.5)) * AMRTEX_QUANTUM;  // as all samples there
   FieldSample s;
   bool has_value = sample_field(p, s);
-  if (a.below < 0 && !exit) {  // it begins there
-    a.below = has_value ? isovalues_below(s.value) : -1;
-    a.before = at;
-    return;
-  }
   note_side(a, !has_value, s.value, exit ? ray.length : ray.first, at);
 }
 

@@ -115,12 +115,9 @@ void take_stencil_sample(INOUT(Accumulation) a, IN(Region) r, IN(Stencil) s, IN(
   accumulate(a, value, length);
 }
 
-// A region that is not sampled, from `begin` to `exit`: a ray passes on its side, and loses it where there is no mesh. `first`: where it would
-// have had its first sample.
-void pass_region(INOUT(Accumulation) a, IN(bool) inside, IN(Region) r, IN(ray_real) begin, IN(ray_real) first, IN(ray_real) exit) {
+// A region that is not sampled, up to `exit`: a ray passes on its side, and loses it where there is no mesh.
+void pass_region(INOUT(Accumulation) a, IN(bool) inside, IN(Region) r, IN(ray_real) exit) {
   if (AMRTEX_ISOVALUES != 0) {
-    if (!inside) note_side(a, true, real(0), begin, first);
-    if (a.crossing) return;  // the border comes first; the region is passed after it
     a.below = inside ? isovalues_below(r.value_range.x) : -1;
     a.before = exit;
   }

@@ -119,11 +119,13 @@ real mean_place(IN(real) k_near, IN(real) k_far, IN(real) depth) {
     return mean - depth * real(0.5) * (real(1) - squares - mean);
   }
   vec3r place = vec3r(0.1127016653792583, 0.5, 0.8872983346207417);
-  vec3r weight = vec3r(5, 8, 5) * (vec3r(linear) + place * (real(2) * square)) * exp(place * (vec3r(linear) + place * square) * -depth);
+  real seen = min(depth, real(64));  // beyond, all weights would be 0; the first one is the nearest in any case
+  vec3r weight = vec3r(5, 8, 5) * (vec3r(linear) + place * (real(2) * square)) * exp(place * (vec3r(linear) + place * square) * -seen);
   return dot(place, weight) / (weight.x + weight.y + weight.z);
 }
 
-// Adds the stretch behind knot i from `lower` to `upper`, of `length`. Seen from its lower end where values rise: what was walked through lies in front.
+// Adds the stretch behind knot i from `lower` to `upper`, of `length`. Where values rise it is seen from its lower end, and what was walked
+// through lies in front.
 void add_stretch(INOUT(Line) line, IN(int) i, IN(real) lower, IN(real) upper, IN(real) length, IN(bool) rising) {
   real x = knot(i, 0);
   real t0 = (lower - x) * knot(i, 1);
@@ -289,8 +291,8 @@ bool take_value(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q, OUT(real) valu
   return !(AMRTEX_VALIDITY != 0 && is_no_value(value));
 }
 
-// Does the value at the end of a piece serve the next one? Not where a cell's face is its neighbour's, and not over log10: rounded from one side it is
-// nothing from the other.
+// Does the value at the end of a piece serve the next one? Not where a cell's face is its neighbour's. Nor over log10: what rounds a large value
+// on this side is a small value's own on the other.
 #define AMRTEX_ENDS_SHARED (AMRTEX_VALIDITY == 0 && AMRTEX_LOGARITHMIC == 0)
 
 // f along the piece from t to t + way; false where it has no value. `from`: f at t where `has_from`, and then at the end.
@@ -323,8 +325,8 @@ bool take_piece(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(vec3r) dq,
 // Is f known to be a cubic on a piece, as well as the curves can tell?
 #define AMRTEX_EXACT_PIECES (AMRTEX_FILTER != AMRTEX_FILTER_BASIS && AMRTEX_LOGARITHMIC == 0)
 
-// How far f may be from the cubic through four of its values. A quotient of sums of hats: twice what it is off by in the middle. Over log10 the rounding
-// of the largest value counts where others are so much smaller.
+// How far f may be from the cubic through four of its values. A quotient of sums of hats: twice what it is off by in the middle. Over log10
+// the rounding of the largest value counts where others are so much smaller.
 real off_cubic(INOUT(Accumulation) a, IN(Region) r, IN(Piece) p, IN(vec3r) middle) {
   real off = real(0);
   if (AMRTEX_FILTER == AMRTEX_FILTER_BASIS) {
@@ -433,10 +435,12 @@ void march_tolerance_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, I
         if (way > AMRTEX_SHORTEST_PIECE * real(r.width)) p.off = off_cubic(a, r, p, q0 + dq * (t + way * real(0.5)));
         real done = march_piece(a, p, begin + t, way, least);
         has_from = has_from && done == real(1);
-        longest = done < real(1) ? way * real(0.25) : way * real(2);
+        longest = done < real(1) ? way * real(0.25) : max(longest, way * real(2));
         way *= done;
       } else if (valued) {
         march_piece(a, p, begin + t, way, least);
+      } else {
+        longest = length;
       }
       t = t + way;
     }

@@ -19,6 +19,7 @@
 #include "structures/readers/amrex_plotfile/amrex_fab.hpp"
 #include "structures/readers/amrex_plotfile/amrex_plotfile.hpp"
 #include "structures/readers/mesh_io.hpp"
+#include "tests/optional_data.hpp"
 
 namespace amrtex {
 namespace {
@@ -289,11 +290,6 @@ void expect_oracle(const fs::path& data, const fs::path& oracle_path) {
   expect_points(mesh, oracle.at("point_samples").at("samples"));
 }
 
-fs::path shared_data() {
-  const char* given = std::getenv("AMRTEX_DATA");
-  return given != nullptr ? fs::path(given) : fs::path(AMRTEX_SOURCE_DIR) / ".." / "shared" / "data";
-}
-
 TEST(AmrexSample, AgreesWithItsOracle) {
   const fs::path data = fs::path(AMRTEX_SOURCE_DIR) / "data" / "amrex_tiny";
   expect_oracle(data / "plt00008", data / "oracle.json");
@@ -312,11 +308,9 @@ TEST(AmrexSample, IsNamedByItsLastTwoFolders) {
 class AmrexOracle : public ::testing::TestWithParam<OracleCase> {};
 
 TEST_P(AmrexOracle, Agrees) {
-  const fs::path data = shared_data() / GetParam().data;
-  const fs::path oracle = shared_data() / GetParam().oracle;
-  if (!fs::exists(data) || !fs::exists(oracle))
-    GTEST_SKIP() << "no " << data << "; set AMRTEX_DATA to the folder of the data sets to run this test";
-  expect_oracle(data, oracle);
+  AMRTEX_NEEDS(test::kSharedData, GetParam().data);
+  AMRTEX_NEEDS(test::kSharedData, GetParam().oracle);
+  expect_oracle(test::kSharedData / GetParam().data, test::kSharedData / GetParam().oracle);
 }
 
 INSTANTIATE_TEST_SUITE_P(Sets, AmrexOracle,
@@ -329,9 +323,8 @@ INSTANTIATE_TEST_SUITE_P(Sets, AmrexOracle,
                                            OracleCase{"amrex_hdf5/plt00012", "amrex_hdf5/oracle_plt00012.json"}));
 
 TEST(AmrexSample, OneRunInOneAndInSeveralFilesIsOneMesh) {
-  const fs::path several = shared_data() / "amrex_tiny_multifile" / "plt00008";
-  if (!fs::exists(several))
-    GTEST_SKIP() << "no " << several << "; set AMRTEX_DATA to the folder of the data sets to run this test";
+  AMRTEX_NEEDS(test::kSharedData, "amrex_tiny_multifile/plt00008");
+  const fs::path several = test::kSharedData / "amrex_tiny_multifile/plt00008";
   const fs::path one = fs::path(AMRTEX_SOURCE_DIR) / "data" / "amrex_tiny" / "plt00008";
   EXPECT_EQ(AmrHierarchy(read_mesh(several)).content_hash(0), AmrHierarchy(read_mesh(one)).content_hash(0));
 }

@@ -11,7 +11,7 @@
 #include <random>
 
 #include "bench/measure/reference_cache.hpp"
-#include "bench/measure/runner.hpp"
+#include "bench/measure/scene_data.hpp"
 #include "bench/settings/experiment.hpp"
 #include "bench/verify/pictures.hpp"
 #include "bench/verify/stiff_media.hpp"
@@ -19,6 +19,7 @@
 #include "renderers/reference/nested_rule.hpp"
 #include "renderers/reference/piece_function.hpp"
 #include "structures/generators/random_mesh.hpp"
+#include "tests/optional_data.hpp"
 #include "tests/test_meshes.hpp"
 
 namespace amrtex {
@@ -361,9 +362,8 @@ TEST(ReferenceCost, IsNoMoreThanThatOfTheStepThatWasTheDefault) {
 // ---- the failing input, where it is at hand ----
 
 TEST(FailingInputs, StiffMediumOnAFile) {
-  const char* given = std::getenv("AMRTEX_FAILING_INPUTS");
-  const fs::path folder = given != nullptr ? fs::path(given) : fs::path(AMRTEX_SOURCE_DIR) / ".." / "shared" / "cases";
-  if (!fs::exists(folder)) GTEST_SKIP() << "no " << folder << "; set AMRTEX_FAILING_INPUTS to the folder of these files";
+  AMRTEX_NEEDS(test::kFailingInputs, "");
+  const fs::path folder = test::kFailingInputs.path();
   const Experiment experiment = read_scene(folder / "stiff_1e6.json");
   const AmrHierarchy h = load_dataset(experiment, experiment.datasets.front());
   const Scene scene = scene_of(experiment, experiment.renders.front());

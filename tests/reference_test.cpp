@@ -18,6 +18,7 @@
 #include "structures/generators/random_mesh.hpp"
 #include "structures/mesh/level_values.hpp"
 #include "structures/readers/mesh_io.hpp"
+#include "tests/optional_data.hpp"
 
 namespace amrtex {
 namespace {
@@ -749,11 +750,6 @@ TEST(ReferenceRandom, PiecesOfARayAreTheFieldAndLeaveNothingOut) {
 
 // ---- oracles made by yt ----
 
-fs::path shared_data() {
-  const char* given = std::getenv("AMRTEX_DATA");
-  return given != nullptr ? fs::path(given) : fs::path(AMRTEX_SOURCE_DIR) / ".." / "shared" / "data";
-}
-
 /// yt names fields "boxlib/phi"; readers know "phi".
 std::string field_name(const std::string& name) { return name.substr(name.find('/') + 1); }
 
@@ -807,11 +803,9 @@ void PrintTo(const DataSet& d, std::ostream* out) { *out << d.data; }
 class ReferenceOracleSets : public ::testing::TestWithParam<DataSet> {};
 
 TEST_P(ReferenceOracleSets, PointSamplesAndLineIntegrals) {
-  const fs::path data = shared_data() / GetParam().data;
-  const fs::path oracle = shared_data() / GetParam().oracle;
-  if (!fs::exists(data) || !fs::exists(oracle))
-    GTEST_SKIP() << "no " << data << "; set AMRTEX_DATA to the folder of the data sets to run this test";
-  check_oracle(data, oracle);
+  AMRTEX_NEEDS(test::kSharedData, GetParam().data);
+  AMRTEX_NEEDS(test::kSharedData, GetParam().oracle);
+  check_oracle(test::kSharedData / GetParam().data, test::kSharedData / GetParam().oracle);
 }
 
 INSTANTIATE_TEST_SUITE_P(Data, ReferenceOracleSets,

@@ -23,6 +23,7 @@
 #include "structures/mesh/quoted.hpp"
 #include "structures/readers/mesh_io.hpp"
 #include "structures/readers/reader_tools.hpp"
+#include "tests/optional_data.hpp"
 
 namespace amrtex {
 namespace {
@@ -540,9 +541,8 @@ TEST_F(BadFiles, CutOrChangedAnywhereAreReadOrRefused) {
 // ---- the inputs that failed, where they are at hand ----
 
 TEST(FailingInputs, AreAnsweredAtOnce) {
-  const char* given = std::getenv("AMRTEX_FAILING_INPUTS");
-  const fs::path folder = given != nullptr ? fs::path(given) : fs::path(AMRTEX_SOURCE_DIR) / ".." / "shared" / "cases";
-  if (!fs::exists(folder)) GTEST_SKIP() << "no " << folder << "; set AMRTEX_FAILING_INPUTS to the folder of these files";
+  AMRTEX_NEEDS(test::kFailingInputs, "");
+  const fs::path folder = test::kFailingInputs.path();
   const auto mesh = [&](const char* name) { return answer([&] { AmrHierarchy(read_mesh(folder / name)).content_hash(0); }); };
   EXPECT_EQ(mesh("version_line_navierstokes"), "accepted");
   EXPECT_THAT(mesh("cell_size_contradicts_domain"), HasSubstr("the cells of level 0 are said to be 0.5 wide along x"));

@@ -3,17 +3,18 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <cstdlib>
 #include <filesystem>
 
-#include "bench/measure/runner.hpp"
+#include "bench/measure/scene_data.hpp"
 #include "bench/measure/value_resolution.hpp"
 #include "bench/numbers/image_error.hpp"
 #include "bench/settings/experiment.hpp"
+#include "bench/verify/thin_cells.hpp"
 #include "renderers/bindings/finest_camera.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
 #include "renderers/scene/stored_units.hpp"
 #include "structures/readers/mesh_io.hpp"
+#include "tests/optional_data.hpp"
 #include "tests/pictures.hpp"
 
 namespace amrtex {
@@ -102,16 +103,6 @@ void expect_values(const Picture& picture, Filter filter, const Ramp& ramp) {
   EXPECT_LE(worst(
                 picture, 0, [&](double x) { return ramp.of(Ramp::place(filter, x)); }, ramp.scale),
             tolerance_of(ramp));
-}
-
-/// The same texels as the values' own floats: what r32f was without units.
-EncodedField as_plain_floats(EncodedField field) {
-  for (HostTexture& t : field.textures) {
-    if (!t.holds_values) continue;
-    for (std::int64_t i = 0; i < t.texels(); ++i) t.as<float>()[i] = static_cast<float>(field.scale.value(t.as<float>()[i]));
-  }
-  field.scale = {};
-  return field;
 }
 
 TEST(Units, ArePlainForOrdinaryFieldsAndFollowFromValuesAlone) {
@@ -203,7 +194,7 @@ TEST(Values, OfAnyScaleAreDrawnOnGl) {
   for (const Ramp& ramp : {kRamps[1], kRamps[4], kRamps[5]}) {
     const AmrHierarchy h = ramp.mesh();
     SCOPED_TRACE(name_of(ramp));
-    for_each_chosen([&](const EncodingCase& c) {
+    GlPairs(2).for_each([&](const EncodingCase& c) {
       const EncodedField field = build(h, c);
       expect_opacities(draw(gl, h, field, light_scene(ramp)), c.filter, ramp);
       expect_values(draw(gl, h, field, columns(Mode::mip)), c.filter, ramp);
@@ -369,48 +360,21 @@ TEST(Resolution, IsFineForCurvesThatStoredValuesFollow) {
 
 // ---- thin cells ----
 
-/// A constant 2 in 8 x 8 x 1 cells of edges (aspect, aspect, 1), seen at about 45 degrees.
-Scene thin_scene(double aspect, Sampling sampling) {
-  const double edge = 8 * aspect;
-  Scene scene = small_scene(Mode::projection, {}, sampling, 6);
-  scene.view.eye = {1.5 * edge, 0.5 * edge, edge};
-  scene.view.at = {0.5 * edge, 0.5 * edge, 0.5};
-  scene.view.up = {0, 1, 0};
-  scene.view.orthographic = true;
-  scene.view.height = 0.6 * edge;
-  scene.settings.step = 0.5;
-  return scene;
-}
-
-AmrHierarchy thin_mesh(double aspect) {
-  return MeshBuilder({8, 8, 1}, {}, Vec3d(0), {8 * aspect, 8 * aspect, 1}).root(constant(2)).hierarchy();
-}
-
-/// 2 L, of the ray's chord L.
-double thin_error(const Picture& picture, const Scene& scene, const AmrHierarchy& h) {
-  double largest = 0;
-  for (int y = 0; y < picture.height; ++y)
-    for (int x = 0; x < picture.width; ++x) {
-      const double exact = 2 * chord(scene, x, y, h.domain_lower(), h.domain_upper());
-      largest = std::max(largest, std::abs(picture.pixel(x, y)[0] / exact - 1));
-    }
-  return largest;
-}
-
 TEST(ThinCells, HaveTheThicknessThatTheyHaveAtAnyAspect) {
   Context& gl = context(ContextKind::egl);
   for (const double aspect : {1.0, 30.0, 1e2, 1e3, 1e4, 1e5, 1e6})
     for (const Sampling sampling : {Sampling::lattice, Sampling::adaptive}) {
-      const AmrHierarchy h = thin_mesh(aspect);
-      const Scene scene = thin_scene(aspect, sampling);
+      const AmrHierarchy h = verify::thin_mesh(aspect);
+      const Scene scene = verify::thin_scene(aspect, sampling);
       SCOPED_TRACE(fmt::format("aspect {} {}", aspect, sampling_name(sampling)));
-      for_each_filter(
-          [&](const EncodingCase& c) { EXPECT_LE(thin_error(render_on_cpu(h, build(h, c), scene, false), scene, h), 1e-5); });
-      for_each_chosen([&](const EncodingCase& c) {
-        if (aspect != 1e4 && aspect != 1e6) return;
-        EXPECT_LE(thin_error(draw(gl, h, build(h, c), scene), scene, h), 1e-5);
+      for_each_filter([&](const EncodingCase& c) {
+        EXPECT_LE(verify::thin_error(render_on_cpu(h, build(h, c), scene, false), scene, h), 1e-5);
       });
-      EXPECT_LE(thin_error(HierarchyReference(h, 0, {Filter::nearest}).render(scene, 1), scene, h), 1e-9);
+      GlPairs(2).for_each([&](const EncodingCase& c) {
+        if (aspect != 1e4 && aspect != 1e6) return;
+        EXPECT_LE(verify::thin_error(draw(gl, h, build(h, c), scene), scene, h), 1e-5);
+      });
+      EXPECT_LE(verify::thin_error(HierarchyReference(h, 0, {Filter::nearest}).render(scene, 1), scene, h), 1e-9);
     }
 }
 
@@ -418,7 +382,7 @@ TEST(ThinCells, NeedRaysInDouble) {
   EXPECT_FALSE(needs_double_rays(nested(waves).hierarchy(),
                                  small_scene(Mode::dvr, perspective({2, -1.5, 1.2}, Vec3d(0.5)), Sampling::lattice)));
   for (const double aspect : {1e2, 1e4, 1e6})
-    EXPECT_TRUE(needs_double_rays(thin_mesh(aspect), thin_scene(aspect, Sampling::lattice)));
+    EXPECT_TRUE(needs_double_rays(verify::thin_mesh(aspect), verify::thin_scene(aspect, Sampling::lattice)));
   // cubic cells in a thin slab, and a thin box of a cube, are as thin
   const AmrHierarchy slab = MeshBuilder({512, 512, 1}, {}, Vec3d(0), {512, 512, 1}).root(constant(2)).hierarchy();
   EXPECT_TRUE(
@@ -563,57 +527,49 @@ TEST(Products, HaveErrorsOfTheirOwnScale) {
 
 // ---- optional data: inputs that once failed ----
 
-/// Beside the data sets.
-fs::path shared_cases() {
-  const char* given = std::getenv("AMRTEX_DATA");
-  return (given != nullptr ? fs::path(given) / ".." : fs::path(AMRTEX_SOURCE_DIR) / ".." / "shared") / "cases";
-}
-
 struct Drawn {
   Scene scene;
   std::vector<Picture> pictures;  ///< CPU in float, GL, reference
 };
 
-std::optional<Drawn> draw_case(const std::string& name) {
-  const fs::path file = shared_cases() / (name + ".json");
-  if (!fs::exists(file)) return std::nullopt;
-  const Experiment scene = read_scene(file);
+Drawn draw_case(const char* file) {
+  const Experiment scene = read_scene(kFailingInputs / file);
   const BuildPoint& point = scene.builds.front();
   const AmrHierarchy h = load_dataset(scene, scene.datasets[point.dataset]);
   const Scene drawn = scene_of(scene, scene.renders.front());
   const EncodedField field = build(h, {&find_encoding(point.encoding), point.filter, point.parameters});
-  return Drawn{drawn,
-               {render_on_cpu(h, field, drawn, false), draw(context(ContextKind::egl), h, field, drawn),
-                HierarchyReference(h, 0, field.definition).render(drawn, 1.0 / 16)}};
+  return {drawn,
+          {render_on_cpu(h, field, drawn, false), draw(context(ContextKind::egl), h, field, drawn),
+           HierarchyReference(h, 0, field.definition).render(drawn, 1.0 / 16)}};
 }
 
 TEST(Cases, ThinAspectOf1e4) {
-  const auto drawn = draw_case("thin_aspect_1e4");
-  if (!drawn) GTEST_SKIP() << "no " << shared_cases();
+  AMRTEX_NEEDS(kFailingInputs, "thin_aspect_1e4.json");
+  const Drawn drawn = draw_case("thin_aspect_1e4.json");
   // 2 over a thickness of 1, seen 3e-6 off 45 degrees
-  for (const Picture& p : drawn->pictures)
+  for (const Picture& p : drawn.pictures)
     EXPECT_LE(worst(
                   p, 0, [](double) { return 2.828436; }, 2.828436),
               1e-5);
 }
 
 TEST(Cases, ValuesOf1em40) {
-  const auto drawn = draw_case("values_1e-40");
-  if (!drawn) GTEST_SKIP() << "no " << shared_cases();
-  for (const Picture& p : drawn->pictures) EXPECT_LE(worst(p, 3, [](double) { return -std::expm1(-2.0); }), 1e-5);
+  AMRTEX_NEEDS(kFailingInputs, "values_1e-40.json");
+  const Drawn drawn = draw_case("values_1e-40.json");
+  for (const Picture& p : drawn.pictures) EXPECT_LE(worst(p, 3, [](double) { return -std::expm1(-2.0); }), 1e-5);
 }
 
 TEST(Cases, OffsetOf1e8) {
-  const auto drawn = draw_case("offset_1e8");
-  if (!drawn) GTEST_SKIP() << "no " << shared_cases();
-  for (const Picture& p : drawn->pictures) {
+  AMRTEX_NEEDS(kFailingInputs, "offset_1e8.json");
+  const Drawn drawn = draw_case("offset_1e8.json");
+  for (const Picture& p : drawn.pictures) {
     std::vector<double> row;
     for (int x = 0; x < p.width; ++x) row.push_back(p.pixel(x, 0)[3]);
     if (row.front() > row.back()) std::reverse(row.begin(), row.end());
     EXPECT_TRUE(std::is_sorted(row.begin(), row.end()));
     EXPECT_NEAR(row.front(), 0.221, 1e-3);
     EXPECT_NEAR(row.back(), 0.976, 1e-3);
-    EXPECT_LE(difference(p, drawn->pictures.back()), 1e-4);
+    EXPECT_LE(difference(p, drawn.pictures.back()), 1e-4);
   }
 }
 

@@ -15,6 +15,7 @@
 #include "renderers/reference/hierarchy_reference.hpp"
 #include "renderers/scene/triangle_mesh.hpp"
 #include "structures/generators/synthetic.hpp"
+#include "tests/optional_data.hpp"
 
 namespace amrtex {
 namespace {
@@ -407,12 +408,9 @@ TEST(PointCount, IsSaidBeforeAnyPointIsMade) {
 
 /// 2 kB that stand for a billion settings; optional data.
 TEST(PointCount, OfASmallFileMayBeLarge) {
-  const char* given = std::getenv("AMRTEX_SHARED_CASES");
-  const std::filesystem::path file =
-      std::filesystem::path(given != nullptr ? given : AMRTEX_SOURCE_DIR "/../shared/cases") / "explode.json";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not there";
+  AMRTEX_NEEDS(test::kFailingInputs, "explode.json");
   try {
-    read_experiment(file);
+    read_experiment(test::kFailingInputs / "explode.json");
     ADD_FAILURE();
   } catch (const UsageError& e) {
     EXPECT_THAT(e.what(), HasSubstr("8748000006 points, 6 builds with 1458000001 pictures each"));

@@ -4,7 +4,6 @@
 #include <sys/resource.h>
 
 #include <cmath>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -32,21 +31,6 @@ inline MeshBuilder fields_with_gaps() {
   MeshBuilder mesh({32, 8, 8}, {2});
   mesh.patch(0, {{0, 0, 0}, {30, 8, 8}}, f).patch(1, Box{{20, 2, 2}, {28, 6, 7}}.refined(2), f);
   return mesh.also("g", g);
-}
-
-/// 4^3 root cells, or 2^3; each further level refines the middle 2^3 of the 4^3 cells of the one before. Values at random.
-inline AmrHierarchy deep_corner(int levels, int root = 4) {
-  std::mt19937_64 random(static_cast<std::uint64_t>(levels));
-  std::uniform_real_distribution<double> unit(0, 1);
-  MeshBuilder mesh(Vec3i(root), std::vector<int>(static_cast<std::size_t>(levels - 1), 2));
-  for (int level = 0; level < levels; ++level) {
-    const Vec3i middle(root / 2 << level);
-    const Vec3i half(std::min(root / 2 << level, 2));
-    std::vector<double> values(static_cast<std::size_t>(Box{-half, half}.cells()));
-    for (double& v : values) v = unit(random);
-    mesh.patch(level, {middle - half, middle + half}, std::move(values));
-  }
-  return mesh.hierarchy();
 }
 
 /// Two cells far apart in a domain of 2^29 x 2^20 x 2^29 cells, the second one refined.

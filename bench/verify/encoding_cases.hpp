@@ -171,4 +171,14 @@ inline std::vector<EncodingCase> make_encoding_cases(const ContextInfo& limits) 
   return all;
 }
 
+/// The same texels as the values' own floats: what r32f was before fields had units.
+inline EncodedField as_plain_floats(EncodedField field) {
+  for (HostTexture& t : field.textures) {
+    if (!t.holds_values) continue;
+    for (std::int64_t i = 0; i < t.texels(); ++i) t.as<float>()[i] = static_cast<float>(field.scale.value(t.as<float>()[i]));
+  }
+  field.scale = {};
+  return field;
+}
+
 }  // namespace amrtex::verify

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -112,6 +113,21 @@ inline MeshBuilder holes_and_missing(const Function& f, int ratio = 2) {
   };
   mesh.patch(1, Box{{2, 4, 1}, {4, 7, 3}}.refined(ratio), with_nan);
   return mesh.patch(1, Box{{5, 5, 5}, {7, 7, 8}}.refined(ratio), f);
+}
+
+/// 4^3 root cells, or 2^3; each further level refines the middle 2^3 of the 4^3 cells of the one before. Values at random.
+inline AmrHierarchy deep_corner(int levels, int root = 4) {
+  std::mt19937_64 random(static_cast<std::uint64_t>(levels));
+  std::uniform_real_distribution<double> unit(0, 1);
+  MeshBuilder mesh(Vec3i(root), std::vector<int>(static_cast<std::size_t>(levels - 1), 2));
+  for (int level = 0; level < levels; ++level) {
+    const Vec3i middle(root / 2 << level);
+    const Vec3i half(std::min(root / 2 << level, 2));
+    std::vector<double> values(static_cast<std::size_t>(Box{-half, half}.cells()));
+    for (double& v : values) v = unit(random);
+    mesh.patch(level, {middle - half, middle + half}, std::move(values));
+  }
+  return mesh.hierarchy();
 }
 
 }  // namespace amrtex::verify

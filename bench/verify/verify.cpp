@@ -14,7 +14,7 @@
 namespace amrtex::verify {
 namespace {
 
-constexpr std::array<Suite, 8> kSuites{{
+constexpr std::array<Suite, 9> kSuites{{
     {"analytic", "pictures and values with a closed form, continuity", analytic_suite},
     {"convergence", "observed orders in step, cells, pixels and isosurfaces", convergence_suite},
     {"stiff", "extinction from 0 to infinity, steps and spikes, thin shells", stiff_suite},
@@ -23,6 +23,7 @@ constexpr std::array<Suite, 8> kSuites{{
     {"differential", "encodings against the reference, each other, GL and memory", differential_suite},
     {"metamorphic", "pictures that a change of the input must leave alone", metamorphic_suite},
     {"reference", "the reference itself, which all others are judged by: stiff media in closed form", reference_suite},
+    {"scales", "cells, values, products and levels of any scale; light that samples miss", scales_suite},
 }};
 
 std::string parameters_text(const Json& parameters) {

@@ -152,5 +152,6 @@ void geometry_suite(VerifyContext& v);
 void differential_suite(VerifyContext& v);
 void metamorphic_suite(VerifyContext& v);
 void reference_suite(VerifyContext& v);
+void scales_suite(VerifyContext& v);
 
 }  // namespace amrtex::verify

@@ -1,4 +1,4 @@
-// The filters of shaders/README.md in double precision, by search in the AmrHierarchy.
+// The filters of docs/filters.md in double precision, by search in the AmrHierarchy.
 // Shares no code with encodings or shaders: what they are judged against.
 #pragma once
 

@@ -219,6 +219,7 @@ void LightIntegral::add_within(const Stretch& stretch, double first, double last
       LightSums sums = sum_light<7>(samples);
       if (splits && sums.depth > kDeepest) {
         place = opaque_place(samples, first, last);
+        if (!(*place > first && *place < last)) place = middle;  // rounded onto an end
       } else {
         double off = std::min(transmittance_ * difference(sums, sum_light<3>(samples)), most);
         const double left = off * std::min(1.0, kSquares * off / (transmittance_ * (sums.spread + sums.depth)));
@@ -280,6 +281,7 @@ void LightIntegral::commit(const LightSums& sums, const Vec3d& base, double off,
   error_ += off + taken * transmittance_;
   if (joins_) error_ += std::min(taken, taken_before_) * before * stretch.color_range();
   joins_ = false;
+  error_ = std::min(1.0, error_);  // no channel can be off by more
   taken_before_ = taken;
 }
 

@@ -1,4 +1,4 @@
-// What filters are defined from (shaders/README.md, "Filters"), by search in the hierarchy: leaves, level values, fills. Private
+// What filters are defined from (docs/filters.md), by search in the hierarchy: leaves, level values, fills. Private
 // to the reference; written from the definitions and from leaf cells alone, not shared with encodings.
 #pragma once
 

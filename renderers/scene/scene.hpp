@@ -85,7 +85,7 @@ enum class Sampling { lattice, adaptive };
 enum class ConsumerKind { raycast, multipass, slices, stencil_slices };
 /// What slices are blended in. Eight bits a channel are the historical control: 256 slices are off by 0.1.
 enum class SliceTarget { rgba32f, rgba8 };
-/// How the light of an interval follows from samples (shaders/README.md, "Integrators"). `euler` and `left` are controls
+/// How the light of an interval follows from samples (docs/integrators.md). `euler` and `left` are controls
 /// of order one; `tolerance` chooses its intervals itself.
 enum class Integrator { exponential_midpoint, euler, left, preintegrated, tolerance };
 /// What a picture of isosurfaces holds: colour; world distance from the ray's origin to the first surface,

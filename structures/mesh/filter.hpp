@@ -8,7 +8,7 @@
 
 namespace amrtex {
 
-/// The field that is reconstructed from the leaf cells (shaders/README.md). The order is that of AMRTEX_FILTER_... in
+/// The field that is reconstructed from the leaf cells (docs/filters.md). The order is that of AMRTEX_FILTER_... in
 /// shaders/contract.glsl.
 enum class Filter { nearest, linear_lod, linear_page, linear_vertex, basis };
 

@@ -1,5 +1,5 @@
 // Level values v_L and their fills for whole boxes: the only definition that encodings use
-// (shaders/README.md, "Filters"; the double reference has its own).
+// (docs/filters.md; the double reference has its own).
 #pragma once
 
 #include <span>
