@@ -99,6 +99,7 @@ cd {}
 while read -r q; do
   case "$q" in
     *'"plan"'*) echo '{{"points": [[0, 0, "a", 0], [0, 1, "b", 0]]}}' >&3 ;;
+    *'"references"'*) echo references >>drawn; [ ! -e fragile ] || kill -SEGV $$; echo '{{"done": true}}' >&3 ;;
     *'"fail"'*) echo "{{\"record\": {{\"failed\": $q}}}}" >&3 ;;
     *'"renders":[0,1]'*)
       echo asked >>asked
@@ -118,13 +119,16 @@ done
 
   std::vector<Json> measure() {
     ProcessGroups groups(options_);
-    EXPECT_EQ(groups.plan(0).size(), 2u);
+    const std::vector<PlannedPoint> points = groups.plan(0);
+    EXPECT_EQ(points.size(), 2u);
+    groups.draw_references(points);
     std::vector<Json> records;
     groups.measure(0, {0, 1}, 0, [&](const Json& record) { records.push_back(record); });
     return records;
   }
-  int asked() const {
-    std::ifstream in(folder_ / "asked");
+  int asked() const { return lines("asked"); }
+  int lines(const char* file) const {
+    std::ifstream in(folder_ / file);
     int n = 0;
     for (std::string line; std::getline(in, line);) ++n;
     return n;
@@ -142,6 +146,21 @@ TEST_F(Groups, MeasureTheirPointsInOneProcess) {
   EXPECT_EQ(records[0], (Json{{"measured", 0}}));
   EXPECT_EQ(records[1], (Json{{"measured", 1}}));
   EXPECT_EQ(asked(), 1);
+}
+
+TEST_F(Groups, AskForReferencesOnce) {
+  play("", "");
+  EXPECT_EQ(measure().size(), 2u);
+  EXPECT_EQ(lines("drawn"), 1);
+}
+
+TEST_F(Groups, ACrashInAReferenceLeavesItToThePoints) {
+  play("", "");
+  std::ofstream(folder_ / "fragile") << "";
+  const std::vector<Json> records = measure();
+  ASSERT_EQ(records.size(), 2u);
+  EXPECT_EQ(records[1], (Json{{"measured", 1}}));
+  EXPECT_EQ(lines("drawn"), 1);
 }
 
 TEST_F(Groups, ACrashCostsItsOwnPoint) {

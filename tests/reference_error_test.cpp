@@ -381,7 +381,9 @@ class ReferenceCacheTest : public testing::Test {
  protected:
   ~ReferenceCacheTest() override { fs::remove_all(folder_); }
   ReferencePicture ask(const ReferenceRule& rule, std::string& hash) const {
-    return cached_reference({h_, "data", {Filter::linear_vertex}, scene_, rule}, folder_, hash);
+    const ReferenceRequest request{h_, "data", {Filter::linear_vertex}, scene_, rule};
+    hash = reference_name(request);
+    return cached_reference(request, folder_);
   }
 
   fs::path folder_ = fs::temp_directory_path() / fmt::format("amrtex_reference_cache_{}", ::getpid());

@@ -10,7 +10,7 @@ namespace {
 
 Json json_or_null(const std::optional<std::int64_t>& value) { return value ? Json(*value) : Json(); }
 
-Json dataset_json(LoadedData& data, const RenderPoint& render) {
+Json dataset_json(const Experiment& experiment, LoadedData& data, const RenderPoint& render) {
   const DatasetSource& source = data.source();
   const AmrHierarchy& mesh = data.mesh();
   std::int64_t patches = 0;
@@ -18,7 +18,7 @@ Json dataset_json(LoadedData& data, const RenderPoint& render) {
   return {{"name", source.name},
           {"source", source.file ? Json(source.written) : source.generate},
           {"hash", data.content_hash()},
-          {"exact_hash", data.exact_hash(render)},
+          {"exact_hash", data.exact_hash(scene_of(experiment, render))},
           {"leaf_cells", mesh.leaf_cells()},
           {"stored_cells", mesh.stored_cells()},
           {"levels", mesh.level_count()},
@@ -50,7 +50,7 @@ void describe_point(Json& record, const Experiment& experiment, LoadedData& data
   record["repetition"] = 0;
   record["process_peak_bytes"] = json_or_null(process_peak_bytes());
   record["asked"] = point_experiment(experiment, build, render);
-  record["dataset"] = dataset_json(data, render);
+  record["dataset"] = dataset_json(experiment, data, render);
   record["encoding"] = build.encoding;
   record["build_parameters"] = build.parameters;
   record["filter"] = filter_name(build.filter);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <vector>
 
 #include "bench/measure/check_bound.hpp"
@@ -13,6 +14,7 @@
 #include "bench/numbers/statistics.hpp"
 #include "bench/records/record.hpp"
 #include "renderers/consumers/make_consumer.hpp"
+#include "structures/mesh/whole_file.hpp"
 
 namespace amrtex {
 namespace {
@@ -37,24 +39,43 @@ std::vector<double> seen_errors(const Picture& picture, const Picture& reference
 }
 
 /// The scene as references draw it.
-Scene reference_scene(const JudgedPicture& judged) {
-  Scene scene = judged.scene;
-  if (judged.experiment.reference->shading) scene.settings.isosurfaces.shading = *judged.experiment.reference->shading;
+Scene reference_scene(const Experiment& experiment, Scene scene) {
+  if (experiment.reference->shading) scene.settings.isosurfaces.shading = *experiment.reference->shading;
   return scene;
 }
 
+/// `scene` must outlive it.
+ReferenceRequest request_of(const Experiment& experiment, LoadedData& data, const Scene& scene, const FilterDefinition& filter) {
+  return {data.mesh(), data.exact_hash(scene), filter, scene, experiment.reference->rule()};
+}
+
+/// A filter of the whole mesh, that of no encoding.
+FilterDefinition common_definition(const AmrHierarchy& mesh, Filter filter) {
+  FilterDefinition common{filter, 0, mesh.finest_level()};
+  if (!common.has_pages()) common.page_level = 0;
+  return common;
+}
+
+/// What the structure of a point will reproduce, before it is built.
+FilterDefinition own_definition(const AmrHierarchy& mesh, const BuildPoint& build) {
+  BuildRequest request;
+  request.storage = build.storage;
+  request.parameters = build.parameters;
+  request.needs.filter = build.filter;
+  return find_encoding(build.encoding).definition(mesh, request);
+}
+
 /// From the cache, where it was drawn before.
-ReferencePicture reference_of(const JudgedPicture& judged, const Scene& scene, const FilterDefinition& filter, std::string& hash) {
-  const AmrHierarchy& mesh = judged.data.mesh();
-  return cached_reference({mesh, exact_data_hash(mesh, scene), filter, scene, judged.experiment.reference->rule()}, judged.references,
-                          hash);
+ReferencePicture reference_of(const JudgedPicture& judged, const FilterDefinition& filter, std::string& hash) {
+  const Scene scene = reference_scene(judged.experiment, judged.scene);
+  const ReferenceRequest request = request_of(judged.experiment, judged.data, scene, filter);
+  hash = reference_name(request);
+  return cached_reference(request, judged.references);
 }
 
 Json common_error(const JudgedPicture& judged, Filter filter) {
-  FilterDefinition common{filter, 0, judged.data.mesh().finest_level()};
-  if (!common.has_pages()) common.page_level = 0;
   std::string hash;
-  const Picture shared = reference_of(judged, reference_scene(judged), common, hash).picture;
+  const Picture shared = reference_of(judged, common_definition(judged.data.mesh(), filter), hash).picture;
   Json error = error_json(compare(judged.picture, shared), hash);
   error["p95"] = percentile(pixel_errors(judged.picture, shared), 0.95);
   error["p95_seen"] = percentile(seen_errors(judged.picture, shared), 0.95);
@@ -100,7 +121,33 @@ Json own_error(const JudgedPicture& judged, const ErrorMetrics& metrics, const R
   return error;
 }
 
+/// The definitions that the point is compared with.
+std::vector<FilterDefinition> definitions_of(const Experiment& experiment, const AmrHierarchy& mesh, const BuildPoint& build) {
+  std::vector<FilterDefinition> all;
+  if (experiment.reference->common_filter) all.push_back(common_definition(mesh, *experiment.reference->common_filter));
+  if (experiment.reference->own) all.push_back(own_definition(mesh, build));
+  return all;
+}
+
 }  // namespace
+
+void draw_references(const Experiment& experiment, LoadedData& data, const std::vector<AskedPoint>& points,
+                     const std::filesystem::path& references) {
+  if (!experiment.reference) return;
+  std::set<std::string> drawn;
+  for (const AskedPoint& point : points) {
+    try {
+      const Scene scene = reference_scene(experiment, scene_of(experiment, point.render));
+      for (const FilterDefinition& filter : definitions_of(experiment, data.mesh(), point.build)) {
+        const ReferenceRequest request = request_of(experiment, data, scene, filter);
+        if (drawn.insert(reference_name(request)).second) cached_reference(request, references);
+      }
+    } catch (const OutputError&) {
+      throw;
+    } catch (const Error&) {  // the point's own record tells it
+    }
+  }
+}
 
 std::optional<Judgement> add_errors(Json& record, const JudgedPicture& judged) {
   if (!judged.experiment.reference) return std::nullopt;
@@ -108,7 +155,7 @@ std::optional<Judgement> add_errors(Json& record, const JudgedPicture& judged) {
   if (reference.common_filter) record["error_common"] = common_error(judged, *reference.common_filter);
   if (!reference.own) return std::nullopt;
   std::string hash;
-  ReferencePicture own = reference_of(judged, reference_scene(judged), judged.structure.field.definition, hash);
+  ReferencePicture own = reference_of(judged, judged.structure.field.definition, hash);
   const ErrorMetrics error = compare(judged.picture, own.picture);
   record["error"] = own_error(judged, error, own, hash);
   return Judgement{error, std::move(own.picture)};

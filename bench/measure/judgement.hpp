@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "bench/measure/loaded_data.hpp"
 #include "bench/numbers/image_error.hpp"
@@ -15,13 +16,24 @@ namespace amrtex {
 /// A picture and all that it is judged by. Everything must outlive the call alone.
 struct JudgedPicture {
   const Experiment& experiment;
-  const LoadedData& data;
+  LoadedData& data;
   const Structure& structure;
   Context& context;
   const Scene& scene;
   const Picture& picture;
   std::filesystem::path references;  ///< folder of reference pictures (reference_cache.hpp)
 };
+
+/// A point of an experiment.
+struct AskedPoint {
+  const BuildPoint& build;
+  const RenderPoint& render;
+};
+
+/// Draws the references of all points that are not in the cache below `references` yet, each once and on all cores. One that cannot be
+/// drawn is left out: whoever asks for it hears why.
+void draw_references(const Experiment& experiment, LoadedData& data, const std::vector<AskedPoint>& points,
+                     const std::filesystem::path& references);
 
 /// What a picture is against its own reference.
 struct Judgement {

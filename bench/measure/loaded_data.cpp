@@ -14,8 +14,7 @@ LoadedData::LoadedData(const Experiment& experiment, std::size_t dataset)
       mesh_(load_dataset(experiment, experiment.datasets[dataset])),
       content_hash_(mesh_.content_hash(0)) {}
 
-const std::string& LoadedData::exact_hash(const RenderPoint& render) {
-  const Scene scene = scene_of(experiment_, render);
+const std::string& LoadedData::exact_hash(const Scene& scene) {
   std::string key;
   for (const TriangleObject& object : scene.settings.triangles) key += object.mesh->content_hash() + " ";
   for (const int field : more_fields(mesh_, scene)) key += fmt::format(" {}", field);
@@ -25,7 +24,7 @@ const std::string& LoadedData::exact_hash(const RenderPoint& render) {
 }
 
 std::string LoadedData::point_hash(const BuildPoint& build, const RenderPoint& render) {
-  return configuration_hash(point_configuration(experiment_, build, render, exact_hash(render)));
+  return configuration_hash(point_configuration(experiment_, build, render, exact_hash(scene_of(experiment_, render))));
 }
 
 }  // namespace amrtex

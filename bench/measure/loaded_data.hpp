@@ -20,8 +20,8 @@ class LoadedData {
   const AmrHierarchy& mesh() const { return mesh_; }
   /// Of the drawn field, equal over formats.
   const std::string& content_hash() const { return content_hash_; }
-  /// Of what is drawn; the mesh is hashed once for each choice of fields and triangles.
-  const std::string& exact_hash(const RenderPoint& render);
+  /// Of what is drawn (exact_data_hash); the mesh is hashed once for each choice of fields and triangles.
+  const std::string& exact_hash(const Scene& scene);
   /// Of all that decides what the point measures; it names the record.
   std::string point_hash(const BuildPoint& build, const RenderPoint& render);
 

@@ -22,6 +22,10 @@ PointMeasurer& LocalGroups::of(std::size_t dataset) {
   return *measurer_;
 }
 
+void LocalGroups::draw_references(const std::vector<PlannedPoint>& points) {
+  if (!points.empty()) of(experiment_.builds.at(points.front().build).dataset).draw_references(points);
+}
+
 void LocalGroups::measure(std::size_t build, const std::vector<std::size_t>& renders, int repetition,
                           const std::function<void(const Json&)>& done) {
   of(experiment_.builds.at(build).dataset).measure(build, renders, repetition, done);

@@ -16,6 +16,8 @@ class LocalGroups {
   LocalGroups(const Experiment& experiment, const RunOptions& options, std::function<void(Phase)> phase = [](Phase) {});
 
   std::vector<PlannedPoint> plan(std::size_t dataset) { return of(dataset).plan(); }
+  /// PointMeasurer::draw_references of points of one data set.
+  void draw_references(const std::vector<PlannedPoint>& points);
   /// PointMeasurer::measure of the build's data set.
   void measure(std::size_t build, const std::vector<std::size_t>& renders, int repetition, const std::function<void(const Json&)>& done);
   Json failure(std::size_t build, std::size_t render, int repetition, std::string_view reason);

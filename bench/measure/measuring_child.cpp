@@ -61,6 +61,10 @@ int answer_questions(const Experiment& experiment, const RunOptions& options, in
       const Json question = Json::parse(*line);
       if (question.contains("plan")) {
         answer(answers, {{"points", to_json(local.plan(question["plan"]))}});
+      } else if (question.contains("references")) {
+        local.draw_references(planned_points_from_json(question["references"]));
+        answer(answers, {{"shares", to_json(local.take_shares())}});
+        answer(answers, {{"done", true}});
       } else if (question.contains("fail")) {
         answer(answers, {{"record", local.failure(question["fail"], question["render"], question["repetition"],
                                                   question["reason"].get<std::string>())}});

@@ -7,12 +7,12 @@
 
 #include "bench/measure/change_time.hpp"
 #include "bench/measure/environment.hpp"
-#include "bench/measure/judgement.hpp"
 #include "bench/measure/left_out_time.hpp"
 #include "bench/measure/scene_data.hpp"
 #include "bench/measure/stopwatch.hpp"
 #include "bench/measure/value_resolution.hpp"
 #include "bench/records/record.hpp"
+#include "bench/records/stored_picture.hpp"
 #include "renderers/bindings/scene_needs.hpp"
 #include "renderers/consumers/make_consumer.hpp"
 #include "structures/mesh/whole_file.hpp"
@@ -107,6 +107,13 @@ std::vector<PlannedPoint> PointMeasurer::plan() {
   return points;
 }
 
+void PointMeasurer::draw_references(const std::vector<PlannedPoint>& points) {
+  std::vector<AskedPoint> asked;
+  for (const PlannedPoint& p : points) asked.push_back({experiment_.builds.at(p.build), experiment_.renders.at(p.render)});
+  timed(shares_, Share::references,
+        [&] { amrtex::draw_references(experiment_, data_, asked, options_.folder / "references"); });
+}
+
 std::unique_ptr<Built> PointMeasurer::build_for(const BuildPoint& build, const RenderPoint& render) {
   options_.phase(Phase::building);
   auto built = build_structure(experiment_, build, data_.mesh(), scene_of(experiment_, render), context());
@@ -176,15 +183,23 @@ Json PointMeasurer::measure_one(const BuildPoint& build, Built& built, const Ren
     return add_errors(record, {experiment_, data_, built.structure, context(), scene, picture, options_.folder / "references"});
   });
   if (!add_check(record, experiment_, build, scene.settings, own)) return record;  // a wrong picture gets no time
-  if (options_.pictures) {
-    make_folder(options_.folder / "pictures");
-    write_png(picture, options_.folder / "pictures" / (record["configuration"].get<std::string>() + ".png"));
-  }
+  if (options_.pictures) keep_picture(record, picture, own);
   options_.phase(Phase::drawing);
   timed(shares_, Share::compilation, [&] { add_work(record, *consumer); });
   if (render.frames > 0) add_times(record, render, *consumer);
   if (experiment_.time_change) add_change(record, built, scene);
   return record;
+}
+
+/// One to look at, and one to compute with.
+void PointMeasurer::keep_picture(const Json& record, const Picture& picture, const std::optional<Judgement>& own) const {
+  const fs::path folder = options_.folder / "pictures";
+  const auto name = record["configuration"].get<std::string>();
+  make_folder(folder);
+  write_png(picture, folder / (name + ".png"));
+  StoredPicture stored{picture, std::nullopt};
+  if (own) stored.difference = difference_of(picture, own->reference);
+  write_stored_picture(folder / (name + ".npz"), stored);
 }
 
 void PointMeasurer::add_warnings(Json& record, const Scene& scene, const Consumer& consumer) const {

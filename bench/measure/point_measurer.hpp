@@ -11,6 +11,7 @@
 #include "bench/measure/built.hpp"
 #include "bench/measure/description.hpp"
 #include "bench/measure/frame_times.hpp"
+#include "bench/measure/judgement.hpp"
 #include "bench/measure/loaded_data.hpp"
 #include "bench/measure/time_shares.hpp"
 
@@ -44,6 +45,8 @@ class PointMeasurer {
   /// All points of the data set, by build.
   std::vector<PlannedPoint> plan();
 
+  /// Draws the references of these points that are not there yet (judgement.hpp).
+  void draw_references(const std::vector<PlannedPoint>& points);
   /// One record for each render point, handed on as soon as it is there. The points share one structure. Throws UsageError for what concerns
   /// the whole experiment, OutputError for the output folder; everything else is a record.
   void measure(std::size_t build, const std::vector<std::size_t>& renders, int repetition, const std::function<void(const Json&)>& done);
@@ -60,6 +63,7 @@ class PointMeasurer {
   std::unique_ptr<Built> build_for(const BuildPoint& build, const RenderPoint& render);
   void add_times(Json& record, const RenderPoint& render, Consumer& consumer);
   void add_change(Json& record, const Built& built, const Scene& scene);
+  void keep_picture(const Json& record, const Picture& picture, const std::optional<Judgement>& own) const;
   void add_warnings(Json& record, const Scene& scene, const Consumer& consumer) const;
   bool equal_needs(const BuildPoint& build, const RenderPoint& a, const RenderPoint& b) const;
 

@@ -117,6 +117,14 @@ std::vector<PlannedPoint> ProcessGroups::plan(std::size_t dataset) {
   }
 }
 
+void ProcessGroups::draw_references(const std::vector<PlannedPoint>& points) {
+  if (points.empty()) return;
+  for (int tries = 1; tries <= kTries; ++tries) {
+    const Outcome outcome = ask({{"references", to_json(points)}}, [](const Json&) {});
+    if (outcome.answered || !outcome.may_try_again) return;
+  }
+}
+
 void ProcessGroups::fail(std::size_t build, std::size_t render, int repetition, std::string_view reason,
                          const std::function<void(const Json&)>& done) {
   const Json question = {{"fail", build}, {"render", render}, {"repetition", repetition}, {"reason", reason}};

@@ -20,6 +20,8 @@ class ProcessGroups {
   ~ProcessGroups();
 
   std::vector<PlannedPoint> plan(std::size_t dataset);
+  /// As PointMeasurer::draw_references. What ends the process is no error: the points that need a reference will tell.
+  void draw_references(const std::vector<PlannedPoint>& points);
   /// As PointMeasurer::measure; what ends a process is a record `failed` of the point that it measured, or of all where it built their
   /// structure, and another process goes on. One that somebody else ended is begun again, twice at most.
   void measure(std::size_t build, const std::vector<std::size_t>& renders, int repetition, const std::function<void(const Json&)>& done);

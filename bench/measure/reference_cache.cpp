@@ -45,13 +45,17 @@ std::optional<ReferencePicture> read_picture(const fs::path& path, const fs::pat
 
 }  // namespace
 
-ReferencePicture cached_reference(const ReferenceRequest& r, const fs::path& folder, std::string& hash) {
+std::string reference_name(const ReferenceRequest& r) {
   Json key = {{"scene", scene_reference(r.scene)}, {"data", r.data_hash}};
   key["filter"] = filter_name(r.definition.filter);
   key["page"] = {r.definition.page_size, r.definition.page_level};
   key["rule"] = rule_json(r.rule);
   key["version"] = kReferenceVersion;
-  hash = configuration_hash(key);
+  return configuration_hash(key);
+}
+
+ReferencePicture cached_reference(const ReferenceRequest& r, const fs::path& folder) {
+  const std::string hash = reference_name(r);
   const fs::path path = folder / (hash + ".npy");
   const fs::path facts = folder / (hash + ".json");
   if (auto known = read_picture(path, facts)) return *std::move(known);

@@ -18,9 +18,12 @@ struct ReferenceRequest {
   ReferenceRule rule;
 };
 
-/// The picture by the double reference, from the cache below `folder` where this version of the reference drew it before by the
-/// same rule. `hash` receives the name of that file.
-ReferencePicture cached_reference(const ReferenceRequest& request, const std::filesystem::path& folder, std::string& hash);
+/// What the picture is called in the cache: a hash of all that it depends on, the version of the reference too.
+std::string reference_name(const ReferenceRequest& request);
+
+/// The picture by the double reference, from the cache below `folder` where it was drawn before; otherwise it is drawn, and kept
+/// there.
+ReferencePicture cached_reference(const ReferenceRequest& request, const std::filesystem::path& folder);
 
 /// `reference_error` and `limited_by_reference` of a record's error: null where the reference does not know its own.
 void add_reference_error(Json& error, const ReferencePicture& reference, const ErrorMetrics& metrics);

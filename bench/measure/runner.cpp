@@ -136,10 +136,19 @@ class Sweep {
       int count = 0;
       for (const Group& group : open) count += static_cast<int>(group.points.size());
       options_.planned(count);
+      draw_references(open);
       const std::uint64_t seed = experiment_.seed + static_cast<std::uint64_t>(repetition);
       for (const Group& group : interleaved(experiment_, std::move(open), seed)) measure(group, repetition);
     }
     if constexpr (requires { measuring_.end_process(); }) measuring_.end_process();
+  }
+
+  /// Before anything is timed.
+  void draw_references(const std::vector<Group>& open) {
+    std::vector<PlannedPoint> points;
+    for (const Group& group : open) points.insert(points.end(), group.points.begin(), group.points.end());
+    if (!points.empty() && experiment_.reference) options_.progress("references");
+    measuring_.draw_references(points);
   }
 
   /// A data set that no wanted point is of need not be read.

@@ -196,7 +196,7 @@ EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy
   EncodedField field;
   field.encoding = encoding.name();
   field.build_parameters = parameters;
-  field.definition.filter = request.needs.filter;
+  field.definition = encoding.definition(hierarchy, request);
   field.filtering = stored_filtering(request);
   field.storage = request.storage;
   const FieldStatistics& s = hierarchy.statistics(request.field);

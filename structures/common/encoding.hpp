@@ -158,6 +158,10 @@ class Encoding {
   virtual Support level_of_detail() const { return {false, "it stores no values of refined cells"}; }
   /// Can parts that the transfer function hides be left out (SceneNeeds::invisible)? Others refuse to be asked.
   virtual bool prunes() const { return false; }
+  /// The mathematics that a field built from the request reproduces. Throws UsageError for a bad parameter.
+  virtual FilterDefinition definition(const AmrHierarchy& /*hierarchy*/, const BuildRequest& request) const {
+    return {.filter = request.needs.filter};
+  }
   /// Builds the field. Throws UsageError for a bad parameter, UnsupportedError for
   /// a filter or a size that this encoding cannot take (naming what it can), and
   /// BudgetError before allocation when the result would pass the limits.

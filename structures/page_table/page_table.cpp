@@ -58,6 +58,7 @@ class PageTable final : public Encoding {
     return {false, "a page is stored at the finest level that it holds, and at no other"};
   }
   bool prunes() const override { return true; }
+  FilterDefinition definition(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
@@ -233,6 +234,12 @@ void add_shader_inputs(const AmrHierarchy& h, const Options& o, const Sizes& siz
   uniforms.emplace_back("u_subtable_shift", table.sub_layout.shift);
 }
 
+FilterDefinition PageTable::definition(const AmrHierarchy& /*hierarchy*/, const BuildRequest& request) const {
+  const bool pages = request.needs.filter == Filter::linear_page;
+  return {.filter = request.needs.filter,
+          .page_size = pages ? complete_parameters(*this, request.parameters).at("page_size").get<int>() : 0};
+}
+
 EncodedField PageTable::build(const AmrHierarchy& h, const BuildRequest& request) const {
   require_filter(*this, request.needs.filter);
   require_level_of_detail(*this, request.needs);
@@ -252,7 +259,6 @@ EncodedField PageTable::build(const AmrHierarchy& h, const BuildRequest& request
   parts.require_budget();
 
   EncodedField field = start_field(*this, h, request, parameters);
-  if (request.needs.filter == Filter::linear_page) field.definition.page_size = o.page_size;
   parts.allocate(field);
   store_pages(h, request, o, size.pool, pages, field);  // and their ranges, which the table holds
   write_table(h, size.table, pages, field);

@@ -49,6 +49,9 @@ class Uniform final : public Encoding {
     return {{"level", "level whose cells the texture has; null: the mesh's finest", nullptr, either({nullptr}, {0})}};
   }
   Support level_of_detail() const override { return {false, "its one texture holds one level (parameter level)"}; }
+  FilterDefinition definition(const AmrHierarchy& hierarchy, const BuildRequest& request) const override {
+    return {.filter = request.needs.filter, .page_level = level(complete_parameters(*this, request.parameters), hierarchy)};
+  }
   EncodedField build(const AmrHierarchy& hierarchy, const BuildRequest& request) const override;
 
  private:
@@ -264,7 +267,6 @@ EncodedField Uniform::build_blocks(const AmrHierarchy& h, const BuildRequest& re
   parts.require_limits();
   EncodedField field = start_field(*this, h, request, parameters);
   field.build_parameters["level"] = p.level;
-  field.definition.page_level = p.level;
   field.shader.defines.emplace_back("AMRTEX_DENSE_LEVEL", p.level);
   field.shader.defines.emplace_back("AMRTEX_DENSE_BORDER", p.border);
   field.shader.defines.emplace_back("AMRTEX_DENSE_VERTICES", p.vertices ? 1 : 0);
