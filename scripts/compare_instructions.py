@@ -3,9 +3,10 @@
 
 usage: scripts/compare_instructions.py PROGRAM OTHER [--size 64] [--levels 2] [--only WORD] [--out FILE]
 
-Valgrind counts the whole program with one frame and with three; half the difference is a frame, of the CPU that llvmpipe's shaders run
-on. Nothing that else goes on changes the count: where frame times are too noisy to tell two programs apart, this does. It says
-nothing of memory and caches.
+Valgrind counts the whole program with two frames and with 22; a twentieth of the difference is a frame, of the CPU that llvmpipe's
+shaders run on. What a run counts beside its frames differs by a million instructions or two from one run to the next, so few frames
+tell nothing. Nothing else that goes on changes the count: where frame times are too noisy to tell two programs apart, this does. It
+says nothing of memory and caches.
 """
 
 import argparse
@@ -19,7 +20,7 @@ import tempfile
 
 import compare_times
 
-FRAMES = (1, 3)
+FRAMES = (2, 22)
 # one thread, vectors that valgrind knows, and a compiler that never takes a shader from an earlier run
 ENVIRONMENT = {"LP_NUM_THREADS": "1", "LP_NATIVE_VECTOR_WIDTH": "256", "GALLIUM_OVERRIDE_CPU_CAPS": "avx2",
                "MESA_SHADER_CACHE_DISABLE": "true"}

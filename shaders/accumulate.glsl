@@ -88,22 +88,19 @@ Accumulation empty_accumulation() {
   return a;
 }
 
-void add_compensated(INOUT(Accumulation) a, IN(real) amount) {
-  PRECISE real y = amount - a.lost;
-  PRECISE real t = a.sum + y;
-  PRECISE real lost = (t - a.sum) - y;
-  a.lost = lost;
-  a.sum = t;
+// Adds to a sum of floats, with what its roundings have lost so far (Kahan).
+void add_to_sum(INOUT(real) sum, INOUT(real) lost, IN(real) amount) {
+  PRECISE real y = amount - lost;
+  PRECISE real t = sum + y;
+  PRECISE real rest = (t - sum) - y;
+  lost = rest;
+  sum = t;
 }
 
-// The same of the length of what has values.
-void add_passed(INOUT(Accumulation) a, IN(real) length) {
-  PRECISE real y = length - a.passed_lost;
-  PRECISE real t = a.passed + y;
-  PRECISE real lost = (t - a.passed) - y;
-  a.passed_lost = lost;
-  a.passed = t;
-}
+void add_compensated(INOUT(Accumulation) a, IN(real) amount) { add_to_sum(a.sum, a.lost, amount); }
+
+// Length of what has values.
+void add_passed(INOUT(Accumulation) a, IN(real) length) { add_to_sum(a.passed, a.passed_lost, length); }
 
 // The control: dC = T k c ds and dT = -T k ds in one explicit step each. T becomes negative or grows without bound where
 // k ds > 1; that is the picture it stands for, kept among numbers.

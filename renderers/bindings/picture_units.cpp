@@ -72,8 +72,7 @@ void add_picture_units(const DomainGeometry& geometry, const EncodedField& field
     if (depth) b.picture = {divisor, 0, 0};
     if (s.mode == Mode::mip) b.picture = {field.scale.units.scale, field.scale.units.offset, 0};
   }
-  // GCC 12 warns of the bounds of a string that define() moves here
-  b.defines.emplace_back("AMRTEX_OFFSET_PICTURE", b.picture.offset != 0 ? 1 : 0);
+  b.define("AMRTEX_OFFSET_PICTURE", b.picture.offset != 0 ? 1 : 0);
 }
 
 int drawn_channels(const PictureUnits& units, int channels) { return units.length > 0 ? 4 : channels; }

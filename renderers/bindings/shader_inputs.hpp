@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -27,7 +28,7 @@ struct SceneBindings {
   bool transfer_exact = true;   ///< evaluated from its points; else from a table of 4096 bins
   double triangle_seconds = 0;  ///< that finding where rays meet triangles took
 
-  void define(std::string name, int value) { defines.emplace_back(std::move(name), value); }
+  void define(std::string_view name, int value) { defines.emplace_back(name, value); }
   void set(std::string name, double value) { uniforms.push_back({std::move(name), std::vector<double>{value}}); }
   void set(std::string name, int value) { uniforms.push_back({std::move(name), std::vector<int>{value}}); }
   void set(std::string name, std::vector<double> values) { uniforms.push_back({std::move(name), std::move(values)}); }
