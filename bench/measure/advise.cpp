@@ -28,8 +28,7 @@ constexpr int kCoarseFrames = 3;
 constexpr double kCoarseSlack = 1.3;         ///< a structure is dropped where its small picture misses the tolerance by more
 constexpr std::size_t kLeastKept = 2;        ///< that go on where all miss it: their numbers say how far the goal is
 constexpr int kFilterEdge = 64;              ///< pixels; the largest picture by which filters are left behind
-constexpr std::size_t kCoarseShapes = 8;     ///< structures tried with all storages, filterings and steps
-constexpr std::size_t kCoarseBuilds = 4;     ///< structures drawn by the integrators whose shaders take long to compile, too
+constexpr std::size_t kCoarseShapes = 6;     ///< structures tried with all storages, filterings and steps
 constexpr double kReferenceShare = 1e-3;     ///< of the tolerance asked for: what references may be off
 constexpr std::size_t kCarefulSettings = 8;  ///< settings measured at full size, at a time
 constexpr int kCarefulRounds = 3;
@@ -42,8 +41,10 @@ RenderSettings with(Integrator integrator, double step) {
   return s;
 }
 
-/// The most exact of the ways to draw, to see which error a structure can reach.
-RenderSettings finest_settings() { return with(Integrator::preintegrated, 0.25); }
+/// To see which error a structure can reach: a fine step of the shader that is compiled in any case, and the most exact of all
+/// ways.
+RenderSettings fine_settings() { return with(Integrator::exponential_midpoint, 0.125); }
+RenderSettings most_exact_settings() { return with(Integrator::preintegrated, 0.25); }
 
 double number_at(const Json& record, const std::string& pointer) {
   const Json& value = value_at(record, pointer);
@@ -114,10 +115,17 @@ class Search {
     Shapes shapes;
     for (const BuildPoint& build : candidate_builds(request_)) shapes[shape_key(build)].push_back(build);
     std::vector<MeasuredCandidate> coarse = one_of_each_shape(with_good_filters(shapes));
-    const std::vector<BuildPoint> best = fastest_builds(within_slack(coarse), kCoarseShapes);
-    add(coarse, measured(with_settings(variants(best, shapes), is_cheap), coarse_, "storages, filterings and steps"));
-    const std::vector<BuildPoint> few = fastest_builds(within_slack(best_of_each_build(coarse)), kCoarseBuilds);
-    add(coarse, measured(with_settings(few, [](const RenderSettings& s) { return !is_cheap(s); }), coarse_, "integrators"));
+    if (std::none_of(coarse.begin(), coarse.end(), [&](const auto& m) { return m.error <= slack(); }))
+      add(coarse, measured(drawn_most_exactly(coarse), coarse_, "more exact"));
+    const std::vector<BuildPoint> best = fastest_builds(within_slack(best_of_each_build(coarse)), kCoarseShapes);
+    // in the order in which shaders take longer to compile
+    add(coarse, measured(with_settings(variants(best, shapes), Integrator::exponential_midpoint), coarse_,
+                         "storages, filterings and steps"));
+    for (const auto& [integrator, most] : {std::pair{Integrator::preintegrated, 4}, std::pair{Integrator::tolerance, 2}}) {
+      const std::vector<BuildPoint> few =
+          fastest_builds(within_slack(best_of_each_build(coarse)), static_cast<std::size_t>(most));
+      add(coarse, measured(with_settings(few, integrator), coarse_, integrator_name(integrator)));
+    }
     measure_carefully(std::move(coarse));
     pass_reasons_on(shapes);
     conclude();
@@ -137,7 +145,7 @@ class Search {
     std::vector<double> ascending;
     for (const auto& [shape, error] : errors) ascending.push_back(error);
     std::sort(ascending.begin(), ascending.end());
-    double bound = request_.tolerance * kCoarseSlack;
+    double bound = slack();
     if (ascending.size() == shapes.size() && ascending.front() > bound)
       bound = ascending[std::min(ascending.size(), kLeastKept) - 1];
     Shapes good;
@@ -160,7 +168,7 @@ class Search {
       for (const auto& [shape, builds] : shapes) {
         if (fitting.contains(shape)) continue;
         const auto build = std::find_if(builds.begin(), builds.end(), [&](const BuildPoint& b) { return b.storage == storage; });
-        if (build != builds.end()) next.push_back({*build, finest_settings()});
+        if (build != builds.end()) next.push_back({*build, fine_settings()});
       }
       for (MeasuredCandidate& m : measured(next, coarse_, format_name(storage))) {
         fitting.insert(shape_key(m.candidate.build));
@@ -179,8 +187,13 @@ class Search {
     return all;
   }
 
-  /// Does its shader compile quickly?
-  static bool is_cheap(const RenderSettings& settings) { return settings.integrator == Integrator::exponential_midpoint; }
+  static std::vector<Candidate> drawn_most_exactly(const std::vector<MeasuredCandidate>& of) {
+    std::vector<Candidate> all;
+    for (const MeasuredCandidate& m : of) all.push_back({m.candidate.build, most_exact_settings()});
+    return all;
+  }
+
+  double slack() const { return request_.tolerance * kCoarseSlack; }
 
   static void add(std::vector<MeasuredCandidate>& all, std::vector<MeasuredCandidate> more) {
     all.insert(all.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
@@ -274,7 +287,7 @@ class Search {
   std::vector<MeasuredCandidate> within_slack(std::vector<MeasuredCandidate> all) {
     std::vector<MeasuredCandidate> left;
     for (const MeasuredCandidate& m : all) {
-      if (m.error <= request_.tolerance * kCoarseSlack)
+      if (m.error <= slack())
         left.push_back(m);
       else
         lose(m.candidate.build, fmt::format("does not reach the error at any step: {:.2g} at the finest", m.error));
@@ -307,13 +320,12 @@ class Search {
     return best;
   }
 
-  /// The builds with those of the settings that are chosen.
-  template <class Chosen>
-  std::vector<Candidate> with_settings(const std::vector<BuildPoint>& builds, Chosen&& chosen) const {
+  /// The builds with all settings of an integrator.
+  std::vector<Candidate> with_settings(const std::vector<BuildPoint>& builds, Integrator integrator) const {
     std::vector<Candidate> all;
     for (const BuildPoint& build : builds)
       for (const RenderSettings& settings : candidate_settings(request_)) {
-        if (!chosen(settings)) continue;
+        if (settings.integrator != integrator) continue;
         if (!interpolates(build.filter) && settings.integrator == Integrator::tolerance) continue;
         if (settings.level_of_detail && !find_encoding(build.encoding).level_of_detail().ok) continue;
         all.push_back({build, settings});
