@@ -30,13 +30,13 @@ def instructions(program, experiment):
     with tempfile.TemporaryDirectory() as folder:
         file = pathlib.Path(folder) / "experiment.json"
         file.write_text(json.dumps(experiment))
-        done = subprocess.run(["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", program, "run", str(file), "--out",
+        done = subprocess.run(["valgrind", "--tool=callgrind", "--trace-children=yes", "--callgrind-out-file=/dev/null", program, "run", str(file), "--out",
                                str(pathlib.Path(folder) / "out")], capture_output=True, text=True,
                               env={**os.environ, **ENVIRONMENT}, check=False)
-        counted = re.search(r"Collected : (\d+)", done.stderr)
+        counted = re.findall(r"Collected : (\d+)", done.stderr)  # of the run, and of the process that it measures in
         if done.returncode != 0 or not counted:
             raise SystemExit(f"{program}: exit {done.returncode}\n{done.stdout}{done.stderr}")
-        return int(counted.group(1))
+        return sum(map(int, counted))
 
 
 def points(experiments):

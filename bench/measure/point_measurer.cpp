@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <future>
 #include <new>
 
 #include "bench/measure/change_time.hpp"
@@ -110,8 +111,7 @@ std::vector<PlannedPoint> PointMeasurer::plan() {
 void PointMeasurer::draw_references(const std::vector<PlannedPoint>& points) {
   std::vector<AskedPoint> asked;
   for (const PlannedPoint& p : points) asked.push_back({experiment_.builds.at(p.build), experiment_.renders.at(p.render)});
-  timed(shares_, Share::references,
-        [&] { amrtex::draw_references(experiment_, data_, asked, options_.folder / "references"); });
+  timed(shares_, Share::references, [&] { amrtex::draw_references(experiment_, data_, asked, options_.folder / "references"); });
 }
 
 std::unique_ptr<Built> PointMeasurer::build_for(const BuildPoint& build, const RenderPoint& render) {
@@ -120,9 +120,8 @@ std::unique_ptr<Built> PointMeasurer::build_for(const BuildPoint& build, const R
   shares_.add(Share::builds, built->build_seconds);
   shares_.add(Share::uploads, built->upload_seconds);
   if (experiment_.explain_left_out)
-    timed(shares_, Share::builds, [&] {
-      time_left_out(find_encoding(build.encoding), data_.mesh(), built->structure.request, built->structure.field);
-    });
+    timed(shares_, Share::builds,
+          [&] { time_left_out(find_encoding(build.encoding), data_.mesh(), built->structure.request, built->structure.field); });
   return built;
 }
 
@@ -183,18 +182,22 @@ Json PointMeasurer::measure_one(const BuildPoint& build, Built& built, const Ren
     return add_errors(record, {experiment_, data_, built.structure, context(), scene, picture, options_.folder / "references"});
   });
   if (!add_check(record, experiment_, build, scene.settings, own)) return record;  // a wrong picture gets no time
-  if (options_.pictures) keep_picture(record, picture, own);
+  // compressed while the counting shader is compiled, and there before anything is timed
+  std::future<void> kept;
+  if (options_.pictures)
+    kept = std::async(std::launch::async,
+                      [&, name = record["configuration"].get<std::string>()] { keep_picture(name, picture, own); });
   options_.phase(Phase::drawing);
   if (options_.count_work) timed(shares_, Share::compilation, [&] { add_work(record, *consumer); });
+  if (kept.valid()) kept.get();
   if (render.frames > 0) add_times(record, render, *consumer);
   if (experiment_.time_change) add_change(record, built, scene);
   return record;
 }
 
 /// One to look at, and one to compute with.
-void PointMeasurer::keep_picture(const Json& record, const Picture& picture, const std::optional<Judgement>& own) const {
+void PointMeasurer::keep_picture(const std::string& name, const Picture& picture, const std::optional<Judgement>& own) const {
   const fs::path folder = options_.folder / "pictures";
-  const auto name = record["configuration"].get<std::string>();
   make_folder(folder);
   write_png(picture, folder / (name + ".png"));
   StoredPicture stored{picture, std::nullopt};
@@ -227,8 +230,8 @@ void PointMeasurer::add_times(Json& record, const RenderPoint& render, Consumer&
 
 void PointMeasurer::add_change(Json& record, const Built& built, const Scene& scene) {
   try {
-    const ChangeTimes change = timed(shares_, Share::frames,
-                                     [&] { return time_changes(context(), data_.mesh(), built.structure, scene, kChanges); });
+    const ChangeTimes change =
+        timed(shares_, Share::frames, [&] { return time_changes(context(), data_.mesh(), built.structure, scene, kChanges); });
     record["change"] = {{"wall_ms", timing_json(change.wall_ms)}, {"bytes", change.bytes}};
   } catch (const UnsupportedError& error) {
     record["change"] = nullptr;

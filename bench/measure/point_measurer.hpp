@@ -1,4 +1,5 @@
-// Measures points of one data set: build, upload, draw, check, time, describe. Knows nothing of files of records, nor of other processes.
+// Measures points of one data set: build, upload, draw, check, time, describe. Knows nothing of files of records, nor of other
+// processes.
 #pragma once
 
 #include <filesystem>
@@ -32,7 +33,7 @@ struct MeasuringOptions {
   std::filesystem::path folder;  ///< of pictures and references
   bool pictures = true;
   bool count_work = true;
-  Json shader_cache;           ///< state of the folder of compiled shaders; null where it is the driver's
+  Json shader_cache;            ///< state of the folder of compiled shaders; null where it is the driver's
   std::string context = "egl";  ///< kind
   std::function<void(Phase)> phase = [](Phase) {};
 };
@@ -48,9 +49,10 @@ class PointMeasurer {
 
   /// Draws the references of these points that are not there yet (judgement.hpp).
   void draw_references(const std::vector<PlannedPoint>& points);
-  /// One record for each render point, handed on as soon as it is there. The points share one structure. Throws UsageError for what concerns
-  /// the whole experiment, OutputError for the output folder; everything else is a record.
-  void measure(std::size_t build, const std::vector<std::size_t>& renders, int repetition, const std::function<void(const Json&)>& done);
+  /// One record for each render point, handed on as soon as it is there. The points share one structure. Throws UsageError for
+  /// what concerns the whole experiment, OutputError for the output folder; everything else is a record.
+  void measure(std::size_t build, const std::vector<std::size_t>& renders, int repetition,
+               const std::function<void(const Json&)>& done);
   /// The record of a point that failed elsewhere: a process that measured it has ended.
   Json failure(std::size_t build, std::size_t render, int repetition, std::string_view reason);
 
@@ -64,7 +66,7 @@ class PointMeasurer {
   std::unique_ptr<Built> build_for(const BuildPoint& build, const RenderPoint& render);
   void add_times(Json& record, const RenderPoint& render, Consumer& consumer);
   void add_change(Json& record, const Built& built, const Scene& scene);
-  void keep_picture(const Json& record, const Picture& picture, const std::optional<Judgement>& own) const;
+  void keep_picture(const std::string& name, const Picture& picture, const std::optional<Judgement>& own) const;
   void add_warnings(Json& record, const Scene& scene, const Consumer& consumer) const;
   bool equal_needs(const BuildPoint& build, const RenderPoint& a, const RenderPoint& b) const;
 

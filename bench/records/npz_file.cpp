@@ -14,6 +14,7 @@ namespace amrtex {
 namespace {
 
 constexpr std::int64_t kMostBytes = std::int64_t{1} << 32;  // of one array: what says more is no picture of ours
+constexpr zip_uint32_t kFast = 1;                           // a sweep waits for it
 const std::vector<std::string> kTypes = {"<f2", "<f4", "<f8", "|u1"};
 
 struct Discard {
@@ -61,7 +62,7 @@ void add_file(zip_t* archive, const std::string& name, const std::string& text) 
     ::zip_source_free(source);
     throw Error(fmt::format("{} of a zip file: {}", name, ::zip_strerror(archive)));
   }
-  ::zip_set_file_compression(archive, static_cast<zip_uint64_t>(index), ZIP_CM_DEFLATE, 6);
+  ::zip_set_file_compression(archive, static_cast<zip_uint64_t>(index), ZIP_CM_DEFLATE, kFast);
   constexpr zip_uint16_t kMidnight = 0, kFirstOf1980 = (1 << 5) | 1;  // no time of writing: equal arrays are equal files
   ::zip_file_set_dostime(archive, static_cast<zip_uint64_t>(index), kMidnight, kFirstOf1980, 0);
 }
