@@ -30,10 +30,11 @@ def instructions(program, experiment):
     with tempfile.TemporaryDirectory() as folder:
         file = pathlib.Path(folder) / "experiment.json"
         file.write_text(json.dumps(experiment))
-        done = subprocess.run(["valgrind", "--tool=callgrind", "--trace-children=yes", "--callgrind-out-file=/dev/null", program, "run", str(file), "--out",
-                               str(pathlib.Path(folder) / "out")], capture_output=True, text=True,
-                              env={**os.environ, **ENVIRONMENT}, check=False)
-        counted = re.findall(r"Collected : (\d+)", done.stderr)  # of the run, and of the process that it measures in
+        valgrind = ["valgrind", "--tool=callgrind", "--trace-children=yes", "--callgrind-out-file=/dev/null", f"--log-file={folder}/log.%p"]
+        done = subprocess.run([*valgrind, program, "run", str(file), "--out", str(pathlib.Path(folder) / "out")], capture_output=True,
+                              text=True, env={**os.environ, **ENVIRONMENT}, check=False)
+        # of the run, and of the process that it measures in
+        counted = [n for log in pathlib.Path(folder).glob("log.*") for n in re.findall(r"Collected : (\d+)", log.read_text())]
         if done.returncode != 0 or not counted:
             raise SystemExit(f"{program}: exit {done.returncode}\n{done.stdout}{done.stderr}")
         return sum(map(int, counted))
