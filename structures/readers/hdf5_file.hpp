@@ -5,6 +5,8 @@
 // Our own checks are promised; inside of the HDF5 library a file made to attack it may still find a fault.
 #pragma once
 
+#include <tbb/parallel_for.h>
+
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -97,5 +99,14 @@ class Hdf5File {
 
 /// "(4, 8, 8)".
 std::string text(const Hdf5Shape& shape);
+
+/// Calls f(i) for i below `count`: at the same time on all cores where Hdf5Numbers are read that allow it, else in order.
+template <class F>
+void for_each_index(std::size_t count, bool parallel, F&& f) {
+  if (parallel)
+    tbb::parallel_for(std::size_t{0}, count, f);
+  else
+    for (std::size_t i = 0; i < count; ++i) f(i);
+}
 
 }  // namespace amrtex
