@@ -16,6 +16,12 @@ double real_or(const Hdf5File& file, const std::string& group, const std::string
   return values.front();
 }
 
+/// Checkpoints count the steps to the next change of the grids, and may hold any variables in any centring.
+void refuse_checkpoint(const Hdf5File& file) {
+  if (file.has_attribute("/", "regrid_interval_0"))
+    file.fail("/", "a checkpoint, as the attribute regrid_interval_0 says; only plot files can be read");
+}
+
 /// PLUTO writes with Chombo and adds its geometry to each level.
 void refuse_curved(const Hdf5File& file) {
   constexpr const char* kGeometries[] = {"unknown", "Cartesian", "cylindrical", "polar", "spherical"};
@@ -38,7 +44,8 @@ bool is_chombo_hdf5(const fs::path& path) {
 }
 
 MeshDescription read_chombo_hdf5(const fs::path& path, const std::vector<std::string>& fields) {
-  ChomboLayout layout = scan_chombo_layout(path);
+  refuse_checkpoint(Hdf5File(path));
+  const ChomboLayout layout = scan_chombo_layout(path);
   refuse_curved(layout.file);
   const ChomboLevel& root = layout.levels.front();
   // PLUTO's corner of the domain, and what its cells are stretched by along y and z
