@@ -201,6 +201,15 @@ class Hdf5Writer {
   hid_t making_groups_;
 };
 
+/// Gives an attribute that there is another value.
+inline void change_attribute(hid_t file, const char* object, const char* name, hid_t type, const void* value) {
+  const hid_t opened = H5Oopen(file, object, H5P_DEFAULT);
+  const hid_t attribute = H5Aopen(opened, name, H5P_DEFAULT);
+  EXPECT_GE(H5Awrite(attribute, type, value), 0) << object << ", " << name;
+  H5Aclose(attribute);
+  H5Oclose(opened);
+}
+
 /// Value of a cell, exact in float32.
 inline double value_at(std::size_t level, std::size_t field, const Vec3i& cell) {
   return 100000.0 * static_cast<double>(field) + 10000.0 * static_cast<double>(level) + cell.x + 16 * cell.y + 256 * cell.z + 0.5;

@@ -29,10 +29,8 @@ class AmrexHdf5 : public FolderTest {
   }
 };
 
-void set_integers(hid_t file, const char* object, const char* name, std::vector<int> values) {
-  const hid_t attribute = H5Aopen_by_name(file, object, name, H5P_DEFAULT, H5P_DEFAULT);
-  EXPECT_GE(H5Awrite(attribute, H5T_NATIVE_INT, values.data()), 0);
-  H5Aclose(attribute);
+void set_integers(hid_t file, const char* object, const char* name, const std::vector<int>& values) {
+  change_attribute(file, object, name, H5T_NATIVE_INT, values.data());
 }
 
 void set_text(hid_t file, const char* name, const char* value) {
@@ -80,9 +78,7 @@ TEST_F(AmrexHdf5, RefusesCornersThatContradictTheCells) {
   write();
   change([](hid_t opened) {
     const double upper[] = {4, 1, 1.5};
-    const hid_t attribute = H5Aopen_by_name(opened, "level_0", "prob_hi", H5P_DEFAULT, H5P_DEFAULT);
-    H5Awrite(attribute, H5T_NATIVE_DOUBLE, upper);
-    H5Aclose(attribute);
+    change_attribute(opened, "level_0", "prob_hi", H5T_NATIVE_DOUBLE, upper);
   });
   EXPECT_THAT(refusal(),
               HasSubstr("level_0: its cells are said to be 0.5 wide along x, but the domain and its cells make them 0.625"));

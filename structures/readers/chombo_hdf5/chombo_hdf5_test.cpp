@@ -27,12 +27,6 @@ class ChomboHdf5 : public FolderTest {
   }
 };
 
-void set_integer(hid_t file, const char* object, const char* name, int value) {
-  const hid_t attribute = H5Aopen_by_name(file, object, name, H5P_DEFAULT, H5P_DEFAULT);
-  EXPECT_GE(H5Awrite(attribute, H5T_NATIVE_INT, &value), 0);
-  H5Aclose(attribute);
-}
-
 TEST_F(ChomboHdf5, ReadsGhostsComponentsTypesAndPackings) {
   const MeshDescription mesh = mesh_of_blocks({"density", "x-momentum", "energy"});
   for (const int ghosts : {0, 1, 3})
@@ -122,7 +116,7 @@ std::vector<BadCase> bad_cases() {
     return [object](hid_t file) { EXPECT_GE(H5Ldelete(file, object, H5P_DEFAULT), 0); };
   };
   const auto sets = [](const char* object, const char* name, int value) {
-    return [=](hid_t file) { set_integer(file, object, name, value); };
+    return [=](hid_t file) { change_attribute(file, object, name, H5T_NATIVE_INT, &value); };
   };
   return {
       {"a level is missing", removes("level_1"), {"level_1: this level is missing"}},
