@@ -342,7 +342,6 @@ void files(VerifyContext& v) {
                 : "no reader of this format; there are those of: " + readable);
   }
 }
-}
 
 // ---- slices ----
 
