@@ -275,12 +275,13 @@ void Hdf5File::State::check_storage(const DataSet& set, const std::string& name)
   if (layout == H5D_VIRTUAL) fail(name, "a virtual data set, whose values lie in other files; such are not read");
   if (H5Pget_external_count(creation.get()) != 0) fail(name, "its values lie in other files, which are not read");
   if (set.count == 0) return;
+  const std::uint64_t stored = H5Dget_storage_size(set.set.get());
+  if (stored == 0) fail(name, fmt::format("its {} values were never written", set.count));
   if (layout == H5D_CHUNKED) {
     check_chunks(set, name, creation.get());
     return;
   }
   const CheckedSize needed = CheckedSize::of(set.count) * static_cast<std::int64_t>(set.type_bytes);
-  const std::uint64_t stored = H5Dget_storage_size(set.set.get());
   if (stored > file_bytes || needed.or_most() > static_cast<std::int64_t>(stored))
     fail(name, fmt::format("its extents {} take {} bytes, but {} are stored, in a file of {}", amrtex::text(set.shape),
                            needed.or_most(), stored, file_bytes));

@@ -189,6 +189,21 @@ TEST_F(Hdf5Layer, RefusesFiltersThatAPluginWouldHaveToBring) {
   EXPECT_THAT(refusal([](const Hdf5File& f) { f.open_numbers("packed", 1); }), HasSubstr("packed: packed by the filter 32013"));
 }
 
+/// So that a chunk of the data set is stored, and no other.
+void write_first_value(hid_t file, const char* name) {
+  const hid_t set = H5Dopen2(file, name, H5P_DEFAULT);
+  const hid_t in_file = H5Dget_space(set);
+  const hsize_t first = 0;
+  const hsize_t one = 1;
+  H5Sselect_hyperslab(in_file, H5S_SELECT_SET, &first, nullptr, &one, nullptr);
+  const hid_t in_memory = H5Screate_simple(1, &one, nullptr);
+  const double value = 1;
+  EXPECT_GE(H5Dwrite(set, H5T_NATIVE_DOUBLE, in_memory, in_file, H5P_DEFAULT, &value), 0);
+  H5Sclose(in_memory);
+  H5Sclose(in_file);
+  H5Dclose(set);
+}
+
 TEST_F(Hdf5Layer, AllocatesNothingForValuesThatAreNotStored) {
   constexpr hsize_t kHuge = hsize_t{1} << 40;
   {
@@ -199,12 +214,19 @@ TEST_F(Hdf5Layer, AllocatesNothingForValuesThatAreNotStored) {
     const hsize_t chunk = hsize_t{1} << 28;
     H5Pset_chunk(creation, 1, &chunk);
     H5Pset_deflate(creation, 1);
+    out.write_set("never", H5T_NATIVE_DOUBLE, {kHuge}, creation, H5T_NATIVE_DOUBLE, nullptr);
+    const hsize_t small_chunk = 16;
+    H5Pset_chunk(creation, 1, &small_chunk);
     out.write_set("chunked", H5T_NATIVE_DOUBLE, {kHuge}, creation, H5T_NATIVE_DOUBLE, nullptr);
     H5Pclose(creation);
+    write_first_value(out.file(), "chunked");
   }
-  EXPECT_THAT(refusal([](const Hdf5File& f) { f.open_numbers("contiguous", 1); }), HasSubstr("contiguous: its extents"));
+  EXPECT_THAT(refusal([](const Hdf5File& f) { f.open_numbers("contiguous", 1); }),
+              HasSubstr("contiguous: its 1099511627776 values were never written"));
+  EXPECT_THAT(refusal([](const Hdf5File& f) { f.open_numbers("never", 1); }), HasSubstr("never: its 1099511627776 values"));
   EXPECT_THAT(refusal([](const Hdf5File& f) { f.open_numbers("chunked", 1); }), HasSubstr("chunked: its extents"));
-  EXPECT_THAT(refusal([](const Hdf5File& f) { f.read_integers("whole"); }), HasSubstr("whole: its extents"));
+  EXPECT_THAT(refusal([](const Hdf5File& f) { f.read_integers("whole"); }),
+              HasSubstr("whole: its 1099511627776 values were never written"));
 }
 
 TEST_F(Hdf5Layer, SaysWhatIsWrongWithAFile) {

@@ -72,7 +72,7 @@ TEST_F(Enzo, ReadsOnlyTheFieldAskedFor) {
   write_enzo(folder_, mesh_of_blocks(kFields));
   EXPECT_EQ(read_mesh(folder_).fields, kFields);
   const MeshDescription mesh = read_mesh(folder_, {"x-velocity"});
-  EXPECT_EQ(mesh.levels[1][2].values, (std::vector{mesh_of_blocks(kFields).levels[1][2].values[1]}));
+  EXPECT_EQ(mesh.levels[1][2].values, (std::vector<std::vector<double>>{mesh_of_blocks(kFields).levels[1][2].values[1]}));
   EXPECT_THAT(message_of<UsageError>([&] { read_mesh(folder_, {"density"}); }), HasSubstr("did you mean 'Density'?"));
 }
 
