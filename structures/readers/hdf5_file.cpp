@@ -109,6 +109,32 @@ bool becomes(H5T_class_t type) {
   return type == H5T_INTEGER || (std::is_same_v<T, double> && type == H5T_FLOAT);
 }
 
+/// Do the parts of a type lie in it? The library writes outside of its buffers where a damaged file says otherwise.
+bool is_sound(hid_t type, int depth = 0) {
+  const std::size_t size = H5Tget_size(type);
+  const H5T_class_t kind = H5Tget_class(type);
+  if (kind == H5T_INTEGER || kind == H5T_FLOAT) {
+    const int offset = H5Tget_offset(type);
+    const std::size_t bits = H5Tget_precision(type);
+    if (offset < 0 || bits == 0 || bits > 8 * size || static_cast<std::size_t>(offset) > 8 * size - bits) return false;
+    if (kind == H5T_INTEGER) return true;
+    std::array<std::size_t, 5> field{};  // sign; exponent: first bit and bits; mantissa: the same
+    if (H5Tget_fields(type, &field[0], &field[1], &field[2], &field[3], &field[4]) < 0) return false;
+    return field[0] < bits && field[1] < bits && field[2] <= bits - field[1] && field[3] < bits && field[4] <= bits - field[3];
+  }
+  if (kind != H5T_COMPOUND) return kind == H5T_STRING;
+  constexpr int kMostNested = 4;
+  const int members = H5Tget_nmembers(type);
+  if (members < 1 || depth > kMostNested) return false;
+  for (int i = 0; i < members; ++i) {
+    const Handle member(H5Tget_member_type(type, static_cast<unsigned>(i)), H5Tclose);
+    const std::size_t at = H5Tget_member_offset(type, static_cast<unsigned>(i));
+    const std::size_t bytes = member ? H5Tget_size(member.get()) : 0;
+    if (bytes == 0 || bytes > size || at > size - bytes || !is_sound(member.get(), depth + 1)) return false;
+  }
+  return true;
+}
+
 std::string without_filling(const char* text, std::size_t most) {
   std::string s(text, ::strnlen(text, most));
   const auto last = s.find_last_not_of(' ');
@@ -297,6 +323,7 @@ Hdf5File::State::DataSet Hdf5File::State::open_set(const std::string& name) {
   d.type_class = H5Tget_class(d.type.get());
   d.type_bytes = H5Tget_size(d.type.get());
   if (d.type_bytes == 0 || d.type_bytes > kMaxRecordBytes) fail(name, fmt::format("values of {} bytes", d.type_bytes));
+  if (!is_sound(d.type.get())) fail(name, "its type is not one of numbers and texts, or damaged");
   const Handle creation(H5Dget_create_plist(d.set.get()), H5Pclose);
   // asked before the extents, for which the library would open what a virtual data set is made of
   if (creation && H5Pget_layout(creation.get()) == H5D_VIRTUAL) check_storage(d, name);
@@ -327,6 +354,7 @@ Hdf5File::State::Attribute Hdf5File::State::open_attribute(const std::string& ob
   if (!a.type || count < 0) fail_call(a.where, "its type cannot be read");
   if (count > kMaxAttributeValues) fail(a.where, fmt::format("{} values", count));
   if (H5Tget_size(a.type.get()) > kMaxRecordBytes) fail(a.where, fmt::format("values of {} bytes", H5Tget_size(a.type.get())));
+  if (!is_sound(a.type.get())) fail(a.where, "its type is not one of numbers and texts, or damaged");
   a.count = static_cast<std::size_t>(count);
   return a;
 }
@@ -667,8 +695,8 @@ std::size_t Hdf5File::rank_of_reals(const std::string& object) const {
   const Handle opened(H5Oopen(state_->file.get(), object.c_str(), state_->links.get()), H5Oclose);
   if (!opened) state_->fail_call(object, "cannot be opened");
   if (H5Iget_type(opened.get()) != H5I_DATASET) return 0;
-  const State::DataSet d = state_->open_set(object);
-  return d.type_class == H5T_FLOAT ? d.shape.size() : 0;
+  const Handle type(H5Dget_type(opened.get()), H5Tclose);
+  return type && H5Tget_class(type.get()) == H5T_FLOAT ? state_->open_set(object).shape.size() : 0;
 }
 
 Hdf5Numbers Hdf5File::open_numbers(const std::string& dataset, std::size_t rank) const {

@@ -229,6 +229,32 @@ TEST_F(Hdf5Layer, AllocatesNothingForValuesThatAreNotStored) {
               HasSubstr("whole: its 1099511627776 values were never written"));
 }
 
+/// Places of a text in another one.
+std::vector<std::size_t> places_of(const std::string& part, const std::string& text) {
+  std::vector<std::size_t> places;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) places.push_back(at);
+  return places;
+}
+
+// the offset of a member stands in the four bytes behind its name, which is filled up to eight: with 0xffff there the
+// library would write outside of its buffer
+TEST_F(Hdf5Layer, RefusesCompoundsWhoseMembersLieOutsideOfThem) {
+  {
+    Hdf5Writer out(file());
+    out.records("records", {"lo_i", "hi_i"}, {1, 2, 3, 4});
+    out.record_attribute("/", "record", {"lo_i", "hi_i"}, {1, 9});
+  }
+  std::string bytes = bytes_of(file());
+  const auto places = places_of("hi_i", bytes);
+  ASSERT_EQ(places.size(), 2U);
+  for (const std::size_t at : places) bytes.replace(at + 8, 2, "\xff\xff");
+  write_bytes(file(), bytes);
+  EXPECT_THAT(refusal([](const Hdf5File& f) { f.read_records("records", {"lo_i"}); }),
+              HasSubstr("records: its type is not one of"));
+  EXPECT_THAT(refusal([](const Hdf5File& f) { f.integers("/", "record"); }),
+              HasSubstr("attribute record: its type is not one of"));
+}
+
 TEST_F(Hdf5Layer, SaysWhatIsWrongWithAFile) {
   { Hdf5Writer(file()).numbers("values", {1000}, counted(1000)); }
   const std::string whole = bytes_of(file());
