@@ -814,7 +814,13 @@ INSTANTIATE_TEST_SUITE_P(Data, ReferenceOracleSets,
                                            DataSet{"amrex_small/plt00020", "amrex_small/oracle.json"},
                                            DataSet{"amrex_ratio4/plt00016", "amrex_ratio4/oracle.json"},
                                            DataSet{"amrex_deep/plt00000", "amrex_deep/oracle.json"},
-                                           DataSet{"amrex_hdf5/plt00012", "amrex_hdf5/oracle_plt00012.json"}));
+                                           DataSet{"amrex_hdf5/plt00012", "amrex_hdf5/oracle_plt00012.json"},
+                                           DataSet{"amrex_hdf5/plt00012_h5.h5", "amrex_hdf5/oracle_plt00012.json"},
+                                           DataSet{"chombo_explosion_r2/explosion.000006.3d.hdf5",
+                                                   "chombo_explosion_r2/oracle.json"},
+                                           DataSet{"enzo_noh_manygrids/DD0001", "enzo_noh_manygrids/oracle.json"},
+                                           DataSet{"flash_sedov/sedov_forced_hdf5_plt_cnt_0000",
+                                                   "flash_sedov/oracle_sedov_forced_hdf5_plt_cnt_0000.json"}));
 
 }  // namespace
 }  // namespace amrtex

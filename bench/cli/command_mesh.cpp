@@ -32,6 +32,7 @@ Json info_json(const AmrHierarchy& mesh) {
   json["finest_cells"] = {finest.x, finest.y, finest.z};
   json["holes"] = mesh.has_holes();
   json["periodic"] = mesh.periodic();
+  json["dimensions"] = mesh.dimensions();
   for (std::size_t f = 0; f < mesh.fields().size(); ++f) {
     const FieldStatistics& s = mesh.statistics(static_cast<int>(f));
     json["fields"].push_back({{"name", mesh.fields()[f]},
@@ -52,6 +53,9 @@ void print_info(const AmrHierarchy& mesh) {
   fmt::print("{}\n  domain      [{:g}, {:g}] x [{:g}, {:g}] x [{:g}, {:g}]\n", printable(mesh.name()), lower.x, upper.x, lower.y,
              upper.y, lower.z, upper.z);
   fmt::print("  leaf cells  {}{}\n", mesh.leaf_cells(), mesh.has_holes() ? " (the mesh has holes)" : "");
+  if (mesh.dimensions() == 2)
+    fmt::print("  two-dimensional data: drawn as a slab {:g} deep, the edge of a finest cell, with copies of each cell along z\n",
+               upper.z - lower.z);
   fmt::print("  hash        {}\n\n  level  patches       cells  leaf cells  ratio to finer\n", json["hash"].get<std::string>());
   for (int l = 0; l < mesh.level_count(); ++l)
     fmt::print("  {:5}  {:7}  {:10}  {:10}  {}\n", l, mesh.patches(l).size(), mesh.stored_cells(l), mesh.leaf_cells(l),
@@ -87,7 +91,7 @@ void add_mesh_commands(CLI::App& app, Command& chosen) {
   auto a = std::make_shared<Arguments>();
 
   CLI::App* info = app.add_subcommand("info", "levels, patches, cells, fields, ranges and hash of a data set");
-  info->add_option("data", a->input, "data set: an AMReX plotfile")->required();
+  info->add_option("data", a->input, "data set, of any format that can be read")->required();
   info->add_option("--field", a->field, "only this field is read");
   info->add_flag("--json", a->json, "for programs");
   info->footer("Example: amrtex info data/amrex_tiny/plt00008");

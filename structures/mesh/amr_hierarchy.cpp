@@ -426,6 +426,7 @@ Vec3d AmrHierarchy::domain_lower() const { return data_->mesh.domain_lower; }
 Vec3d AmrHierarchy::domain_upper() const { return data_->mesh.domain_upper; }
 Vec3d AmrHierarchy::spacing(int level) const { return (domain_upper() - domain_lower()) / Vec3d(cells(level)); }
 std::array<bool, 3> AmrHierarchy::periodic() const { return data_->mesh.periodic; }
+int AmrHierarchy::dimensions() const { return data_->mesh.dimensions; }
 const std::vector<std::string>& AmrHierarchy::fields() const { return data_->mesh.fields; }
 
 int AmrHierarchy::field_index(const std::string& field) const {

@@ -31,6 +31,7 @@ struct MeshDescription {
   std::vector<std::string> fields;         ///< names of the arrays in each patch
   std::vector<std::vector<Patch>> levels;  ///< patches a level; a level may be empty
   std::array<bool, 3> periodic{false, false, false};
+  int dimensions = 3;  ///< of the data: 2 for those that stand as a slab, whose values do not change along z
 };
 
 /// The leaf cell that holds a position.
@@ -79,6 +80,7 @@ class AmrHierarchy {
   Vec3d domain_upper() const;      ///< world
   Vec3d spacing(int level) const;  ///< cell widths along the axes, world
   std::array<bool, 3> periodic() const;
+  int dimensions() const;  ///< of the data that the mesh was read from
 
   const std::vector<std::string>& fields() const;
   /// Index of the field, or a UsageError that names the fields there are.

@@ -3,7 +3,11 @@
 #include <fmt/format.h>
 
 #include "structures/mesh/quoted.hpp"
+#include "structures/readers/amrex_hdf5/amrex_hdf5.hpp"
 #include "structures/readers/amrex_plotfile/amrex_plotfile.hpp"
+#include "structures/readers/chombo_hdf5/chombo_hdf5.hpp"
+#include "structures/readers/enzo/enzo.hpp"
+#include "structures/readers/flash_hdf5/flash_hdf5.hpp"
 
 namespace amrtex {
 namespace {
@@ -17,6 +21,10 @@ struct Format {
 /// One line a format; the first whose probe says yes reads.
 constexpr Format kFormats[] = {
     {"AMReX plotfile (a folder with a file `Header`)", is_amrex_plotfile, read_amrex_plotfile},
+    {"AMReX-HDF5 (attribute `plotfile_type`)", is_amrex_hdf5, read_amrex_hdf5},
+    {"Chombo (HDF5, group `Chombo_global`)", is_chombo_hdf5, read_chombo_hdf5},
+    {"Enzo (a folder with `NAME` and `NAME.hierarchy`)", is_enzo, read_enzo},
+    {"FLASH (HDF5, `sim info`)", is_flash_hdf5, read_flash_hdf5},
 };
 
 std::string known_formats() {

@@ -12,16 +12,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <glm/glm.hpp>
 #include <optional>
 
 #include "structures/mesh/checked.hpp"
+#include "structures/readers/index_box.hpp"
 #include "structures/readers/reader_tools.hpp"
 
 namespace amrtex {
-
-/// Indices as AMReX writes them; wider than its own 32 bits so that sums cannot overflow.
-using Vec3l = glm::vec<3, std::int64_t>;
 
 /// IEEE numbers of a FAB.
 struct RealFormat {

@@ -216,9 +216,6 @@ void scan_ranges(TextScanner& in, CellHeader& cells, std::int64_t version, std::
 
 }  // namespace
 
-std::string text(const Vec3l& v) { return fmt::format("({},{},{})", v.x, v.y, v.z); }
-std::string text(const IndexBox& b) { return fmt::format("({} {})", text(b.lower), text(b.upper)); }
-
 IndexBox scan_box(TextScanner& in, std::string_view what) {
   IndexBox box;
   in.expect("(", what);

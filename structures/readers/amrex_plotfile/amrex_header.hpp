@@ -14,23 +14,10 @@
 
 #include "structures/mesh/spaces.hpp"
 #include "structures/readers/amrex_plotfile/amrex_fab.hpp"
+#include "structures/readers/index_box.hpp"
 #include "structures/readers/reader_tools.hpp"
 
 namespace amrtex {
-
-/// A range of indices in the file's own convention: both corners inclusive, any origin.
-struct IndexBox {
-  Vec3l lower{0};
-  Vec3l upper{0};
-
-  bool operator==(const IndexBox&) const = default;
-  Vec3l size() const { return upper - lower + std::int64_t{1}; }
-  bool contains(const IndexBox& b) const {
-    return glm::all(glm::lessThanEqual(lower, b.lower)) && glm::all(glm::greaterThanEqual(upper, b.upper));
-  }
-};
-std::string text(const Vec3l& v);
-std::string text(const IndexBox& b);
 
 struct LevelEntry {
   std::int64_t grids = 0;

@@ -2,14 +2,13 @@
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
-#include <unistd.h>
 
-#include <algorithm>
 #include <new>
 
-#include "structures/mesh/quoted.hpp"
 #include "structures/readers/amrex_plotfile/amrex_data.hpp"
+#include "structures/readers/memory_check.hpp"
 #include "structures/readers/reader_tools.hpp"
+#include "structures/readers/wanted_fields.hpp"
 
 namespace amrtex {
 namespace {
@@ -23,18 +22,14 @@ void read_patch(const FabSource& fab, const IndexBox& domain, std::size_t compon
   patch.values = read_components(fab, components, wanted);
 }
 
-/// Sparse files make sizes that no memory holds: found out before anything is allocated.
-void check_memory(const fs::path& path, const std::vector<LevelSources>& sources, std::size_t fields) {
-  double bytes = 0;
+CheckedSize cells_of(const std::vector<LevelSources>& sources) {
+  CheckedSize cells;
   for (const LevelSources& level : sources)
     for (const FabSource& fab : level.fabs) {
-      const Vec3d size(fab.valid.size());
-      bytes += size.x * size.y * size.z * static_cast<double>(fields * sizeof(double));
+      const Vec3l size = fab.valid.size();
+      cells += CheckedSize(size.x) * size.y * size.z;
     }
-  const double memory = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
-  if (bytes > memory)
-    throw BudgetError(fmt::format("{}: the values of {} fields take {:.3e} bytes, this machine has {:.3e}", path.string(), fields,
-                                  bytes, memory));
+  return cells;
 }
 
 void read_levels(const fs::path& path, const PlotHeader& header, const std::vector<LevelSources>& sources,
@@ -53,19 +48,6 @@ void read_levels(const fs::path& path, const PlotHeader& header, const std::vect
   }
 }
 
-/// Components to read: those of the fields, or all.
-std::vector<std::size_t> wanted_components(const fs::path& path, const PlotHeader& header,
-                                           const std::vector<std::string>& fields) {
-  std::vector<std::size_t> wanted;
-  for (const std::string& field : fields.empty() ? header.fields : fields) {
-    const auto found = std::find(header.fields.begin(), header.fields.end(), field);
-    if (found == header.fields.end())
-      throw UsageError(fmt::format("{}: no field {}; its fields are {}", path.string(), quote(field), listed(header.fields)));
-    wanted.push_back(static_cast<std::size_t>(found - header.fields.begin()));
-  }
-  return wanted;
-}
-
 }  // namespace
 
 bool is_amrex_plotfile(const fs::path& path) {
@@ -76,10 +58,10 @@ bool is_amrex_plotfile(const fs::path& path) {
 
 MeshDescription read_amrex_plotfile(const fs::path& path, const std::vector<std::string>& fields) {
   const PlotHeader header = scan_header(path);
-  const std::vector<std::size_t> wanted = wanted_components(path, header, fields);
+  const std::vector<std::size_t> wanted = wanted_fields(path, header.fields, fields);
   std::vector<LevelSources> sources;
   for (std::size_t level = 0; level < header.levels.size(); ++level) sources.push_back(locate_level(header, level));
-  check_memory(path, sources, wanted.size());
+  require_memory(path, cells_of(sources), wanted.size());
   MeshDescription mesh;
   mesh.name = dataset_name(path);
   mesh.domain_lower = header.lower;
