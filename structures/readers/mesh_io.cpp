@@ -4,6 +4,9 @@
 
 #include "structures/mesh/quoted.hpp"
 #include "structures/readers/amrex_plotfile/amrex_plotfile.hpp"
+#include "structures/readers/exabrick/exabrick.hpp"
+#include "structures/readers/npz_mesh/npz_mesh.hpp"
+#include "structures/readers/raw_volume/raw_volume.hpp"
 
 namespace amrtex {
 namespace {
@@ -17,6 +20,9 @@ struct Format {
 /// One line a format; the first whose probe says yes reads.
 constexpr Format kFormats[] = {
     {"AMReX plotfile (a folder with a file `Header`)", is_amrex_plotfile, read_amrex_plotfile},
+    {"volume (NRRD, a `.npy` of three axes, or `name_WxHxD_type.raw`)", is_raw_volume, read_raw_volume},
+    {"npz (a `.npz` of levels, boxes and values)", is_npz_mesh, read_npz_mesh},
+    {"ExaBrick (`.cells` or `.bricks` with `.scalars`, or the `.exa` that names them)", is_exabrick, read_exabrick},
 };
 
 std::string known_formats() {

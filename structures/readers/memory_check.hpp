@@ -1,0 +1,14 @@
+// Files may claim sizes that no memory holds: found out before anything is allocated.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+#include "structures/mesh/checked.hpp"
+
+namespace amrtex {
+
+/// Throws BudgetError where the values of so many cells and fields take more than this machine has.
+void require_memory(const std::filesystem::path& path, CheckedSize cells, std::size_t fields);
+
+}  // namespace amrtex
