@@ -24,7 +24,7 @@ struct CoarsenCriterion {
   /// than this share of the volume's range. 0: only where values are equal.
   double tolerance = 1.0 / 256;
   /// It is as well when all its values lie in one of these ranges, which a transfer function hides.
-  std::vector<std::array<double, 2>> hidden;
+  std::vector<std::array<double, 2>> hidden = {};
   int levels = 5;  ///< at most; 1 to 16
   int block = 8;   ///< cells along an axis; even, 2 to 256
 };
