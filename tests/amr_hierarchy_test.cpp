@@ -356,6 +356,30 @@ TEST(Refused, BoxesThatCutCoarserCells) {
               AllOf(HasSubstr("level 1, patch 0"), HasSubstr("does not align with the cells of level 0"), HasSubstr("ratio 2")));
 }
 
+TEST(Leaves, HolesMayBeSingleCellsWhereNoCoarserCellIsStored) {
+  // of the cell (1, 0, 0) of level 0, which no patch stores, three children exist
+  const AmrHierarchy h = MeshBuilder({3, 2, 2}, {2})
+                             .patch(0, {{0, 0, 0}, {1, 2, 2}}, constant(1))
+                             .patch(1, {{2, 0, 0}, {4, 1, 1}}, constant(2))
+                             .patch(1, {{3, 1, 0}, {4, 2, 1}}, constant(8))
+                             .hierarchy();
+  EXPECT_EQ(h.leaf_cells(), 7);
+  EXPECT_TRUE(h.has_holes());
+  EXPECT_FALSE(h.find_leaf({2, 1, 0}).has_value());
+  EXPECT_EQ(h.level_value(0, {1, 0, 0}, 0), 4) << "the mean of those that exist";
+  EXPECT_DOUBLE_EQ(h.statistics(0).volume_integral, (4 * 8 * 1 + 2 * 2 + 8) / 96.0);
+}
+
+TEST(Refused, BoxesThatCutACoarserCellThatHasAPatch) {
+  const auto mesh = [](int begin) {
+    return MeshBuilder({4, 2, 2}, {2})
+        .patch(0, {{0, 0, 0}, {2, 2, 2}}, constant(1))
+        .patch(1, {{begin, 0, 0}, {8, 4, 4}}, constant(2));
+  };
+  EXPECT_EQ(refusal(mesh(5).description()), "accepted");
+  EXPECT_THAT(refusal(mesh(3).description()), HasSubstr("does not align with the cells of level 0"));
+}
+
 TEST(Refused, CellsRefinedOnlyInPart) {
   // aligned with level 1, but only half of a cell of level 0 that is stored
   const auto mesh = MeshBuilder(Vec3i(4), {2, 2}).root(constant(1)).patch(2, {{0, 0, 0}, {2, 4, 4}}, constant(1));

@@ -342,6 +342,38 @@ TEST_F(CommandLine, ConvertKeepsTheHash) {
   EXPECT_FALSE(fs::exists(at("other")));
 }
 
+TEST_F(CommandLine, ConvertWritesTheFormatOfTheEnding) {
+  for (const char* name : {"copy.cells", "copy.npz"}) {
+    EXPECT_EQ(amrtex({"convert", kData, at(name)}).exit_code, 0);
+    EXPECT_EQ(hash_of(at(name)), hash_of(kData)) << name;
+  }
+  EXPECT_EQ(amrtex({"convert", kData, at("copy.vtkhdf")}).exit_code, 0);
+  EXPECT_THAT(read_text(at("copy.vtkhdf")), HasSubstr("VTKHDF"));
+  expect_complaint(amrtex({"convert", kData, at("copy.vti")}), 2, AllOf(HasSubstr("copy.vti"), HasSubstr("vtkhdf (.vtkhdf)")));
+  expect_complaint(amrtex({"convert", kData, at("x"), "--format", "nzp"}), 2, AllOf(HasSubstr("'nzp'"), HasSubstr("'npz'")));
+  EXPECT_FALSE(fs::exists(at("x")));
+}
+
+TEST_F(CommandLine, ConvertMakesLevelsOfAVolumeByWhatIsStated) {
+  const fs::path volume = at("half_32x32x32_uint8.raw");
+  std::string values(32 * 32 * 32, '\0');
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = i % 32 < 16 ? '\0' : static_cast<char>(i * i % 101);
+  write_text(volume, values);
+  const auto leaf_cells = [&](const std::string& name, const std::vector<std::string>& stated) {
+    std::vector<std::string> arguments = {"convert", volume, at(name)};
+    arguments.insert(arguments.end(), stated.begin(), stated.end());
+    EXPECT_EQ(amrtex(arguments).exit_code, 0) << name;
+    return Json::parse(amrtex({"info", at(name), "--json"}).out).at("leaf_cells").get<int>();
+  };
+  EXPECT_EQ(leaf_cells("levels_1", {"--levels", "1"}), 32 * 32 * 32);
+  EXPECT_EQ(leaf_cells("equal", {"--levels", "2", "--tolerance", "0"}), 16 * 32 * 32 + 8 * 16 * 16);
+  EXPECT_EQ(leaf_cells("hidden", {"--levels", "2", "--tolerance", "0", "--transfer-function",
+                                  R"({"extinction": [[200, 0], [255, 1]], "color": [[0, 1, 1, 1]]})"}),
+            16 * 16 * 16);
+  expect_complaint(amrtex({"convert", volume, at("x"), "--tolerance", "2"}), 2, AllOf(HasSubstr("tolerance 2"), HasSubstr("0 to 1")));
+  expect_complaint(amrtex({"convert", kData, at("x"), "--levels", "2"}), 2, HasSubstr("volumes of equal cells"));
+}
+
 // --- contexts ---
 
 TEST_F(CommandLine, EncodingsTellFiltersAndParameters) {

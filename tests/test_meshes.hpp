@@ -33,6 +33,16 @@ inline MeshBuilder fields_with_gaps() {
   return mesh.also("g", g);
 }
 
+/// Holes that are single cells of two levels, beside siblings: a body of which the cells inside are left out.
+inline MeshBuilder hole_of_single_cells(const Function& f) {
+  MeshBuilder mesh({4, 4, 4}, {2, 2});
+  mesh.patch(0, {{0, 0, 0}, {4, 4, 2}}, f).patch(0, {{0, 0, 2}, {4, 2, 3}}, f);
+  // of cell (1, 2, 2) of level 0 seven children, of one of these five
+  mesh.patch(1, {{2, 4, 4}, {4, 6, 5}}, f).patch(1, {{2, 4, 5}, {4, 5, 6}}, f);
+  mesh.patch(2, {{4, 10, 10}, {6, 12, 11}}, f).patch(2, {{4, 10, 11}, {5, 11, 12}}, f);
+  return mesh.patch(1, {{5, 5, 5}, {8, 8, 8}}, f);
+}
+
 /// Two cells far apart in a domain of 2^29 x 2^20 x 2^29 cells, the second one refined.
 inline AmrHierarchy two_cells_far_apart() {
   const Vec3i root(1 << 29, 1 << 20, 1 << 29);
@@ -66,6 +76,7 @@ inline std::vector<NamedMesh> conformance_meshes() {
   meshes.push_back({"jump of two levels", jump_of_two(waves).hierarchy()});
   meshes.push_back({"holes and missing values", holes_and_missing(waves).hierarchy()});
   meshes.push_back({"holes and missing values, ratio 3", holes_and_missing(waves, 3).hierarchy()});
+  meshes.push_back({"holes of single cells", hole_of_single_cells(waves).hierarchy()});
   meshes.push_back({"one cell", MeshBuilder({1, 1, 1}).root(constant(0.7)).hierarchy()});
   return meshes;
 }

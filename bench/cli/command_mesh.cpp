@@ -116,21 +116,6 @@ void add_mesh_commands(CLI::App& app, Command& chosen) {
       return 0;
     };
   });
-
-  CLI::App* convert = app.add_subcommand("convert", "a data set of any readable format, as an AMReX plotfile");
-  convert->add_option("in", a->input, "data set")->required();
-  convert->add_option("out", a->output, "folder to write; must not exist")->required();
-  convert->add_option("--field", a->field, "only this field");
-  convert->footer(
-      "Example: amrtex convert data/amrex_tiny/plt00008 out/copy\nValues under finer patches become the means of what covers "
-      "them.");
-  convert->callback([a, &chosen] {
-    chosen = [a] {
-      write_amrex_plotfile(
-          AmrHierarchy(read_mesh(a->input, a->field.empty() ? std::vector<std::string>() : std::vector{a->field})), a->output);
-      return 0;
-    };
-  });
 }
 
 }  // namespace amrtex

@@ -15,7 +15,8 @@ namespace amrtex {
 using Command = std::function<int()>;
 
 /// Each sets `chosen` when its subcommand was given.
-void add_mesh_commands(CLI::App& app, Command& chosen);     // info, generate, convert
+void add_mesh_commands(CLI::App& app, Command& chosen);     // info, generate
+void add_convert_command(CLI::App& app, Command& chosen);
 void add_context_commands(CLI::App& app, Command& chosen);  // encodings, doctor
 void add_sample_command(CLI::App& app, Command& chosen);
 void add_structure_command(CLI::App& app, Command& chosen);

@@ -60,6 +60,7 @@ int main(int argc, char** argv) {
   amrtex::Command chosen;
   amrtex::add_context_commands(app, chosen);
   amrtex::add_mesh_commands(app, chosen);
+  amrtex::add_convert_command(app, chosen);
   amrtex::add_sample_command(app, chosen);
   amrtex::add_structure_command(app, chosen);
   amrtex::add_render_command(app, chosen);

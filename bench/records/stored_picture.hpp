@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "bench/records/npz_file.hpp"
+#include "structures/mesh/npz_file.hpp"
 #include "renderers/scene/picture.hpp"
 
 namespace amrtex {

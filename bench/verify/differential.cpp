@@ -9,8 +9,8 @@
 #include "bench/verify/verify.hpp"
 #include "renderers/consumers/make_consumer.hpp"
 #include "structures/generators/random_mesh.hpp"
-#include "structures/readers/amrex_plotfile/amrex_plotfile.hpp"
 #include "structures/readers/mesh_io.hpp"
+#include "structures/readers/write_mesh.hpp"
 
 namespace amrtex::verify {
 namespace {
@@ -314,28 +314,31 @@ std::string formats_read() {
   return names;
 }
 
-void files(VerifyContext& v) {
+/// Meshes with all that a plotfile holds, written under a name with this ending and read back.
+Check written_and_read(int meshes, const std::string& ending) {
   namespace fs = std::filesystem;
-  v.once("27 AMReX plotfile, written and read: one content hash", [&] {
-    const fs::path folder = fs::temp_directory_path() / fmt::format("amrtex_verify_{}", getpid());
-    fs::create_directories(folder);
-    int same = 0;
-    const int meshes = v.size(6, 60);
-    RandomMeshOptions options;
-    options.power_of_two_ratios = true;
-    options.empty_levels = false;
-    for (int seed = 0; seed < meshes; ++seed) {
-      const AmrHierarchy mesh(random_mesh(static_cast<std::uint64_t>(seed), options));
-      const fs::path file = folder / std::to_string(seed);
-      write_amrex_plotfile(mesh, file);
-      same += AmrHierarchy(read_mesh(file)).content_hash(0) == mesh.content_hash(0) ? 1 : 0;
-    }
-    fs::remove_all(folder);
-    return holds(same == meshes, fmt::format("{} of {} meshes", meshes, meshes), fmt::format("{}", same));
-  });
+  const fs::path folder = fs::temp_directory_path() / fmt::format("amrtex_verify_{}", getpid());
+  fs::create_directories(folder);
+  int same = 0;
+  RandomMeshOptions options;
+  options.power_of_two_ratios = true;
+  options.empty_levels = false;
+  for (int seed = 0; seed < meshes; ++seed) {
+    const AmrHierarchy mesh(random_mesh(static_cast<std::uint64_t>(seed), options));
+    const fs::path file = folder / (std::to_string(seed) + ending);
+    write_mesh(mesh, file);
+    same += AmrHierarchy(read_mesh(file)).content_hash(0) == mesh.content_hash(0) ? 1 : 0;
+  }
+  fs::remove_all(folder);
+  return holds(same == meshes, fmt::format("{} of {} meshes", meshes, meshes), fmt::format("{}", same));
+}
+
+void files(VerifyContext& v) {
+  for (const auto& [format, ending] : {std::pair("AMReX plotfile", ""), std::pair(".cells", ".cells"), std::pair(".npz", ".npz")})
+    v.once(fmt::format("27 {}, written and read: one content hash", format), [&] { return written_and_read(v.size(6, 60), ending); });
   // formats that nothing here writes: real files, and what other readers found in them, are with each reader's tests
   const std::string readable = formats_read();
-  for (const std::string format : {"Chombo", "Enzo", "FLASH", "VTKHDF", ".cells"}) {
+  for (const std::string format : {"Chombo", "AMReX-HDF5", "Enzo", "FLASH", "VTKHDF"}) {
     const bool read = readable.find(format) != std::string::npos;
     v.skip(fmt::format("27 {}, read: the hash of the same mesh from AMReX", format), nullptr,
            read ? "nothing here writes this format; the tests of its reader compare hashes"

@@ -12,7 +12,7 @@
 #include <iterator>
 #include <limits>
 
-#include "renderers/scene/npy.hpp"
+#include "structures/mesh/npy.hpp"
 #include "structures/mesh/error.hpp"
 #include "structures/mesh/value_units.hpp"
 #include "structures/mesh/whole_file.hpp"

@@ -432,8 +432,10 @@ class Partition {
 
   void split(Tree& tree, std::vector<Task>& tasks, Task& t) {
     const Plane plane = choose(t);
-    const int level = t.owner >= 0 ? t.owner : std::max(t.level - 1, t.split_level);
-    const int cells = (plane.at - t.box.lower[plane.axis]) / hierarchy_.cell_width(level);
+    int level = t.owner >= 0 ? t.owner : std::max(t.level - 1, t.split_level);
+    const int offset = plane.at - t.box.lower[plane.axis];
+    while (offset % hierarchy_.cell_width(level) != 0) ++level;  // beside a hole a subgrid may end inside of a coarser cell
+    const int cells = offset / hierarchy_.cell_width(level);
     if (cells > options_.limits.split)
       throw UnsupportedError(
           fmt::format("encoding kd_tree: a node is split {} cells of level {} from its corner, it tells at most {}", cells, level,

@@ -130,6 +130,7 @@ struct AmrHierarchy::Data {
 
   void check_levels();
   void check_patches(int level) const;
+  bool cuts_stored_cell(int level, const Box& box) const;
   void mark_leaves(int level);
   std::string mark_patch(int level, std::size_t patch);
   bool covered(int level, const Box& box) const;
@@ -172,6 +173,17 @@ void AmrHierarchy::Data::check_levels() {
   for (std::size_t l = cells.size() - 1; l > 0; --l) width[l - 1] = width[l] * mesh.ratios[l - 1];
 }
 
+/// Does the box hold a part only of a cell that the next coarser level stores?
+bool AmrHierarchy::Data::cuts_stored_cell(int level, const Box& box) const {
+  const int r = mesh.ratios[static_cast<std::size_t>(level - 1)];
+  const Box touched = box.coarsened(r);
+  if (touched.refined(r) == box) return false;
+  const Box whole{ceil_div(box.lower, r), floor_div(box.upper, r)};
+  for (int k : patches_in(level - 1, touched))
+    if (!whole.contains(intersection(patches(level - 1)[static_cast<std::size_t>(k)].box, touched))) return true;
+  return false;
+}
+
 void AmrHierarchy::Data::check_patches(int level) const {
   const auto& list = patches(level);
   const Box domain{Vec3i(0), cells[static_cast<std::size_t>(level)]};
@@ -185,12 +197,9 @@ void AmrHierarchy::Data::check_patches(int level) const {
     for (const auto& values : list[k].values)
       if (static_cast<std::int64_t>(values.size()) != box.cells())
         refuse(fmt::format("level {}, patch {}: {} values for {} cells", level, k, values.size(), box.cells()));
-    if (level > 0) {
-      const int r = mesh.ratios[static_cast<std::size_t>(level - 1)];
-      if (box.coarsened(r).refined(r) != box)
-        refuse(fmt::format("level {}, patch {}: the box {} does not align with the cells of level {} (refinement ratio {})",
-                           level, k, text(box), level - 1, r));
-    }
+    if (level > 0 && cuts_stored_cell(level, box))
+      refuse(fmt::format("level {}, patch {}: the box {} does not align with the cells of level {} (refinement ratio {})", level, k,
+                         text(box), level - 1, mesh.ratios[static_cast<std::size_t>(level - 1)]));
   }
   for (std::size_t k = 0; k < list.size(); ++k)
     for (int other : patches_in(level, list[k].box))

@@ -50,10 +50,10 @@ struct FieldStatistics {
   std::int64_t cells_without_value = 0;  ///< leaf cells that hold NaN or an infinity
 };
 
-/// A validated mesh. Legal: holes, patches that are not nested in one parent, any
+/// A validated mesh. Legal: holes of any cells, patches that are not nested in one parent, any
 /// level jump, empty levels. Refused with an Error that names the data set, the
 /// level and the patch: boxes outside their level, overlapping patches of one level,
-/// boxes that do not align with the next coarser level's cells, cells refined only
+/// boxes that hold a part only of a cell that the next coarser level stores, cells refined only
 /// in part, ratios below 2, more than 31 bits of finest index.
 ///
 /// Values stored under finer patches are not used: on construction each refined

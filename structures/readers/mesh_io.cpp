@@ -8,6 +8,9 @@
 #include "structures/readers/chombo_hdf5/chombo_hdf5.hpp"
 #include "structures/readers/enzo/enzo.hpp"
 #include "structures/readers/flash_hdf5/flash_hdf5.hpp"
+#include "structures/readers/exabrick/exabrick.hpp"
+#include "structures/readers/npz_mesh/npz_mesh.hpp"
+#include "structures/readers/raw_volume/raw_volume.hpp"
 
 namespace amrtex {
 namespace {
@@ -25,6 +28,9 @@ constexpr Format kFormats[] = {
     {"Chombo (HDF5, group `Chombo_global`)", is_chombo_hdf5, read_chombo_hdf5},
     {"Enzo (a folder with `NAME` and `NAME.hierarchy`)", is_enzo, read_enzo},
     {"FLASH (HDF5, `sim info`)", is_flash_hdf5, read_flash_hdf5},
+    {"volume (NRRD, a `.npy` of three axes, or `name_WxHxD_type.raw`)", is_raw_volume, read_raw_volume},
+    {"npz (a `.npz` of levels, boxes and values)", is_npz_mesh, read_npz_mesh},
+    {"ExaBrick (`.cells` or `.bricks` with `.scalars`, or the `.exa` that names them)", is_exabrick, read_exabrick},
 };
 
 std::string known_formats() {

@@ -1,85 +1,19 @@
 // Writes plotfiles: float64 FABs, little endian, `Cell_H` version 1, one data file a level.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
 #include <bit>
-#include <cerrno>
 #include <cmath>
-#include <fstream>
 #include <limits>
 
 #include "structures/mesh/quoted.hpp"
+#include "structures/mesh/unfinished_folder.hpp"
 #include "structures/readers/amrex_plotfile/amrex_plotfile.hpp"
 
 namespace amrtex {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// A folder that vanishes with this object unless it is published under its final name.
-class TemporaryFolder {
- public:
-  explicit TemporaryFolder(const fs::path& target) : target_(target) {
-    std::error_code failure;
-    for (int attempt = 0; attempt < 100 && path_.empty() && !failure; ++attempt) {
-      const fs::path candidate = target.parent_path() / fmt::format(".{}.{}-{}", target.filename().string(), ::getpid(), attempt);
-      if (fs::create_directory(candidate, failure)) path_ = candidate;
-    }
-    if (path_.empty())
-      throw Error(fmt::format("{}: no folder can be made beside it: {}", target.string(),
-                              failure ? reason_of(failure) : "all names are taken"));
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;  // a destructor has nobody to tell
-    if (!path_.empty()) fs::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  const fs::path& path() const { return path_; }
-  void publish() {
-    refuse_existing(target_);
-    std::error_code failure;
-    fs::rename(path_, target_, failure);
-    if (failure) throw Error(fmt::format("{}: cannot be given its name: {}", target_.string(), reason_of(failure)));
-    path_.clear();
-  }
-
-  static void refuse_existing(const fs::path& target) {
-    if (fs::exists(fs::symlink_status(target)))
-      throw Error(fmt::format("{}: exists already; give the name of a folder that does not", target.string()));
-  }
-
- private:
-  fs::path target_;
-  fs::path path_;
-};
-
-/// A file of the plotfile; closing it tells whether all went well.
-class OutputFile {
- public:
-  explicit OutputFile(const fs::path& path) : path_(path), out_(path, std::ios::binary) { check(); }
-  void write(const char* bytes, std::size_t count) {
-    out_.write(bytes, static_cast<std::streamsize>(count));
-    check();
-    written_ += count;
-  }
-  void write(const std::string& s) { write(s.data(), s.size()); }
-  std::uint64_t written() const { return written_; }
-  void close() {
-    out_.close();
-    check();
-  }
-
- private:
-  void check() const {
-    if (!out_) throw Error(fmt::format("{}: cannot be written: {}", path_.string(), reason_of({errno, std::generic_category()})));
-  }
-  fs::path path_;
-  std::ofstream out_;
-  std::uint64_t written_ = 0;
-};
 
 std::string box_text(const Box& box) {
   const Vec3i upper = box.upper - Vec3i(1);
@@ -136,8 +70,7 @@ std::vector<std::uint64_t> write_level_data(const AmrHierarchy& mesh, int level,
     offsets.push_back(out.written());
     out.write(fmt::format("FAB ((8, (64 11 52 0 1 12 0 1023)),(8, (8 7 6 5 4 3 2 1))){} {}\n", box_text(patch.box),
                           patch.values.size()));
-    for (const auto& values : patch.values)
-      out.write(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(double));
+    for (const auto& values : patch.values) out.write_values(values);
   }
   out.close();
   return offsets;
@@ -176,11 +109,10 @@ void check_field_names(const AmrHierarchy& mesh, const fs::path& path) {
 }  // namespace
 
 void write_amrex_plotfile(const AmrHierarchy& hierarchy, const fs::path& path) {
-  fs::path target = path.lexically_normal();
-  if (target.filename().empty()) target = target.parent_path();
+  const fs::path target = without_slash(path);
   check_field_names(hierarchy, target);
-  TemporaryFolder::refuse_existing(target);
-  TemporaryFolder folder(target);
+  refuse_existing(target);
+  UnfinishedFolder folder(target);
   for (int level = 0; level < hierarchy.level_count(); ++level) {
     const fs::path level_folder = folder.path() / fmt::format("Level_{}", level);
     std::error_code failure;

@@ -5,7 +5,7 @@
 #include <map>
 #include <string>
 
-#include "renderers/scene/npy.hpp"
+#include "structures/mesh/npy.hpp"
 
 namespace amrtex {
 

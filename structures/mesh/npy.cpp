@@ -1,4 +1,4 @@
-#include "renderers/scene/npy.hpp"
+#include "structures/mesh/npy.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -61,27 +61,38 @@ std::string npy_text(const NpyArray& array) {
   return whole + text + array.bytes;
 }
 
-NpyArray parse_npy(std::string_view text, const std::string& name, const std::vector<std::string>& types) {
+NpyHeader parse_npy_header(std::string_view text, const std::string& name, const std::vector<std::string>& types) {
   if (text.size() < kMagicBytes || !text.starts_with(kMagic)) refuse(name, "is no npy file of version 1");
   const std::size_t length = static_cast<unsigned char>(text[8]) + std::size_t{256} * static_cast<unsigned char>(text[9]);
   if (text.size() - kMagicBytes < length) refuse(name, "ends inside its npy header");
   const std::string header(text.substr(kMagicBytes, length));
   const std::string type = header_value(header, "descr", name);
-  NpyArray array;
+  NpyHeader found;
+  found.bytes = kMagicBytes + length;
   for (const std::string& accepted : types)
-    if (type == fmt::format("'{}'", accepted)) array.type = accepted;
-  if (array.type.empty())
+    if (type == fmt::format("'{}'", accepted)) found.type = accepted;
+  if (found.type.empty())
     refuse(name, fmt::format("the npy type is {}; accepted are '{}'", clipped(type), fmt::join(types, "' and '")));
   if (header_value(header, "fortran_order", name) != "False") refuse(name, "is in Fortran order; accepted is C order");
-  array.shape = shape_of(header, name);
-  CheckedSize expected = CheckedSize(array.type.back() - '0');
-  for (const std::int64_t n : array.shape) expected = expected * n;
-  const std::size_t actual = text.size() - kMagicBytes - length;
-  if (!expected.fits() || actual != static_cast<std::uint64_t>(expected.or_most()))
-    refuse(name, fmt::format("has {} bytes of values; the shape ({}) of its npy header asks for {}", actual,
-                             clipped(fmt::format("{}", fmt::join(array.shape, ", "))), expected.fits() ? std::to_string(expected.or_most()) : "more than 2^63"));
-  array.bytes = text.substr(kMagicBytes + length);
-  return array;
+  found.shape = shape_of(header, name);
+  CheckedSize expected = CheckedSize(found.type.back() - '0');
+  for (const std::int64_t n : found.shape) expected = expected * n;
+  found.value_bytes = expected.or_most();
+  return found;
+}
+
+void require_npy_bytes(const NpyHeader& header, std::uint64_t bytes, const std::string& name) {
+  const bool fits = header.value_bytes < CheckedSize::kMost;
+  if (fits && bytes == static_cast<std::uint64_t>(header.value_bytes)) return;
+  refuse(name, fmt::format("has {} bytes of values; the shape ({}) of its npy header asks for {}", bytes,
+                           clipped(fmt::format("{}", fmt::join(header.shape, ", "))),
+                           fits ? std::to_string(header.value_bytes) : "more than 2^63"));
+}
+
+NpyArray parse_npy(std::string_view text, const std::string& name, const std::vector<std::string>& types) {
+  const NpyHeader header = parse_npy_header(text, name, types);
+  require_npy_bytes(header, text.size() - header.bytes, name);
+  return {header.type, header.shape, std::string(text.substr(header.bytes))};
 }
 
 }  // namespace amrtex

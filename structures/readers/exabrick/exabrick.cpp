@@ -1,0 +1,103 @@
+#include "structures/readers/exabrick/exabrick.hpp"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+#include "structures/readers/exabrick/exa_files.hpp"
+#include "structures/readers/exabrick/exa_mesh.hpp"
+#include "structures/readers/memory_check.hpp"
+#include "structures/readers/reader_tools.hpp"
+#include "structures/readers/wanted_fields.hpp"
+
+namespace amrtex {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<ExaField> fields_to_read(const fs::path& path, const std::vector<ExaField>& all,
+                                     const std::vector<std::string>& names) {
+  std::vector<std::string> there;
+  for (const ExaField& field : all) there.push_back(field.name);
+  std::vector<ExaField> wanted;
+  for (const std::size_t i : wanted_fields(path, there, names)) wanted.push_back(all[i]);
+  return wanted;
+}
+
+/// All arrays of scalars go with the same cells.
+std::uint64_t common_count(const std::vector<ExaField>& fields) {
+  const std::uint64_t count = count_exa_scalars(fields.front().scalars);
+  for (const ExaField& field : fields)
+    if (const std::uint64_t other = count_exa_scalars(field.scalars); other != count)
+      throw Error(
+          fmt::format("{}: {} values, but {} has {}", field.scalars.string(), other, fields.front().scalars.string(), count));
+  return count;
+}
+
+void set_domain(const ExaLeaves& leaves, const std::optional<ExaRemap>& remap, MeshDescription& mesh) {
+  const auto world = [&](const Vec3d& p) {
+    if (!remap) return p;
+    return remap->to_lower +
+           (p - remap->from_lower) * (remap->to_upper - remap->to_lower) / (remap->from_upper - remap->from_lower);
+  };
+  mesh.domain_lower = world(leaves.lower);
+  mesh.domain_upper = world(leaves.upper);
+  mesh.root_cells = leaves.root_cells;
+}
+
+void fill_patches(const std::vector<ExaField>& fields, const ExaLeaves& leaves, MeshDescription& mesh) {
+  for (const ExaField& field : fields) {
+    const std::vector<float> scalars = load_exa_scalars(field.scalars);
+    for (std::size_t level = 0; level < mesh.levels.size(); ++level)
+      tbb::parallel_for(std::size_t{0}, mesh.levels[level].size(), [&](std::size_t k) {
+        Patch& patch = mesh.levels[level][k];
+        patch.values.push_back(box_values(patch.box, leaves.levels[level], scalars));
+      });
+  }
+}
+
+}  // namespace
+
+bool is_exabrick(const fs::path& path) {
+  std::error_code ignored;
+  const auto known = [](const fs::path& file) {
+    const std::string ending = file.extension().string();
+    return ending == ".cells" || ending == ".bricks" || ending == ".exa";
+  };
+  if (fs::is_directory(path, ignored))
+    return std::any_of(fs::directory_iterator(path, ignored), fs::directory_iterator(),
+                       [&](const fs::directory_entry& entry) { return known(entry.path()); });
+  if (!fs::is_regular_file(path, ignored)) return false;
+  if (known(path) || path.extension() == ".scalars") return true;
+  // under any other name: as many cells as the scalars beside it have values
+  const fs::path scalars = fs::path(path).replace_extension(".scalars");
+  if (!fs::is_regular_file(scalars, ignored)) return false;
+  const auto bytes = fs::file_size(path, ignored);
+  return bytes > 0 && bytes % sizeof(ExaCell) == 0 && fs::file_size(scalars, ignored) == bytes / sizeof(ExaCell) * sizeof(float);
+}
+
+MeshDescription read_exabrick(const fs::path& path, const std::vector<std::string>& fields) {
+  const ExaFiles files = find_exa_files(path);
+  const std::vector<ExaField> wanted = fields_to_read(path, files.fields, fields);
+  const ExaLeaves leaves = place_leaves(files.geometry, load_exa_cells(files, common_count(wanted)));
+  const auto boxes = patch_boxes(files.geometry, leaves);
+  MeshDescription mesh;
+  mesh.name = dataset_name(path);
+  set_domain(leaves, files.remap, mesh);
+  for (const ExaField& field : wanted) mesh.fields.push_back(field.name);
+  CheckedSize cells;
+  for (const auto& level : boxes) {
+    std::vector<Patch>& patches = mesh.levels.emplace_back();
+    for (const Box& box : level) {
+      patches.push_back({box, {}});
+      cells += box.cells();
+    }
+  }
+  require_memory(path, cells, wanted.size());
+  for (std::size_t l = 1; l < leaves.widths.size(); ++l) mesh.ratios.push_back(leaves.widths[l - 1] / leaves.widths[l]);
+  fill_patches(wanted, leaves, mesh);
+  return mesh;
+}
+
+}  // namespace amrtex
