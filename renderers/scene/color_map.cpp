@@ -34,6 +34,8 @@ Vec3d linear_from_xyz(const Vec3d& p) {
 double lab_curve(double t) { return t > 216.0 / 24389 ? std::cbrt(t) : (24389.0 / 27 * t + 16) / 116; }
 double lab_curve_back(double f) { return f > 6.0 / 29 ? f * f * f : (116 * f - 16) * 27 / 24389; }
 
+}  // namespace
+
 Vec3d lab_from_linear(const Vec3d& linear) {
   const Vec3d p = xyz_from_linear(linear) / kWhite;
   const double x = lab_curve(p.x), y = lab_curve(p.y), z = lab_curve(p.z);
@@ -45,6 +47,8 @@ Vec3d linear_from_lab(const Vec3d& lab) {
   const Vec3d p(lab_curve_back(y + lab.y / 500), lab_curve_back(y), lab_curve_back(y - lab.z / 200));
   return glm::clamp(linear_from_xyz(p * kWhite), Vec3d(0), Vec3d(1));
 }
+
+namespace {
 
 /// Lab in polar form: magnitude, saturation and hue as angles.
 struct Msh {
@@ -83,6 +87,24 @@ bool joins(const ColorPoints& dense, const std::vector<Vec3d>& srgb, std::size_t
   for (std::size_t k = i + 1; k < j; ++k)
     if (!fits(k)) return false;
   return true;
+}
+
+ColorPoints fewest_of_block(const ColorPoints& dense, double bound) {
+  constexpr std::size_t kFar = std::numeric_limits<std::size_t>::max();
+  std::vector<Vec3d> srgb;
+  for (const auto& p : dense) srgb.push_back(srgb_from_linear(p.rgb));
+  // of each point: how many are needed from it to the end, and the next of them
+  std::vector<std::size_t> count(dense.size(), kFar), next(dense.size(), 0);
+  count.back() = 1;
+  for (std::size_t i = dense.size() - 1; i-- > 0;)
+    for (std::size_t j = dense.size() - 1; j > i; --j)
+      if (count[j] + 1 < count[i] && joins(dense, srgb, i, j, bound)) {
+        count[i] = count[j] + 1;
+        next[i] = j;
+      }
+  ColorPoints points{dense.front()};
+  for (std::size_t i = 0; i + 1 < dense.size(); i = next[i]) points.push_back(dense[next[i]]);
+  return points;
 }
 
 // --- the maps ---
@@ -217,20 +239,15 @@ Vec3d diverging_color(const Vec3d& first, const Vec3d& last, double share) {
 
 ColorPoints fewest_points(const ColorPoints& dense, double bound) {
   if (dense.size() < 3) return dense;
-  constexpr std::size_t kFar = std::numeric_limits<std::size_t>::max();
-  std::vector<Vec3d> srgb;
-  for (const auto& p : dense) srgb.push_back(srgb_from_linear(p.rgb));
-  // of each point: how many are needed from it to the end, and the next of them
-  std::vector<std::size_t> count(dense.size(), kFar), next(dense.size(), 0);
-  count.back() = 1;
-  for (std::size_t i = dense.size() - 1; i-- > 0;)
-    for (std::size_t j = dense.size() - 1; j > i; --j)
-      if (count[j] + 1 < count[i] && joins(dense, srgb, i, j, bound)) {
-        count[i] = count[j] + 1;
-        next[i] = j;
-      }
+  constexpr std::size_t kBlock = 512;
   ColorPoints points{dense.front()};
-  for (std::size_t i = 0; i + 1 < dense.size(); i = next[i]) points.push_back(dense[next[i]]);
+  for (std::size_t first = 0; first + 1 < dense.size(); first += kBlock) {
+    const std::size_t last = std::min(first + kBlock, dense.size() - 1);
+    const ColorPoints block(dense.begin() + static_cast<std::ptrdiff_t>(first),
+                            dense.begin() + static_cast<std::ptrdiff_t>(last) + 1);
+    const ColorPoints some = fewest_of_block(block, bound);
+    points.insert(points.end(), some.begin() + 1, some.end());
+  }
   return points;
 }
 

@@ -25,7 +25,7 @@ const std::vector<std::string_view>& color_map_names();
 ColorPoints color_map(std::string_view name);
 
 /// The fewest of these points whose curve, linear in light, is nowhere farther than `bound` in a channel of sRGB from any of
-/// them; ends stay. Values ascend.
+/// them; ends stay, and of more than 512 points every 512th. Values ascend.
 ColorPoints fewest_points(const ColorPoints& dense, double bound);
 
 /// A map from 0 to 1 laid over lower to upper, or over their logarithms.
@@ -35,6 +35,9 @@ ColorPoints stretch(const ColorPoints& map, double lower, double upper, bool log
 /// space Msh; `share` from 0 to 1, sRGB.
 Vec3d diverging_color(const Vec3d& first, const Vec3d& last, double share);
 
+/// CIELAB under D65; back, what no screen shows is cut to its colours.
+Vec3d lab_from_linear(const Vec3d& linear);
+Vec3d linear_from_lab(const Vec3d& lab);
 /// Lightness L* of CIELAB, 0 to 100.
 double lightness(const Vec3d& linear);
 
