@@ -15,6 +15,7 @@
 #include "renderers/reference/hierarchy_reference.hpp"
 #include "renderers/scene/background.hpp"
 #include "renderers/scene/color_map.hpp"
+#include "renderers/scene/framing.hpp"
 #include "renderers/scene/scene_settings.hpp"
 #include "structures/mesh/quoted.hpp"
 #include "structures/mesh/whole_file.hpp"
@@ -30,6 +31,8 @@ struct Arguments : SceneArguments {
   bool reference = false;
   bool color_bar = false;
   bool no_color_bar = false;
+  bool outline = false;
+  bool no_outline = false;
   bool transparent = false;
   bool explain_error = false;
   bool prune = false;
@@ -73,6 +76,10 @@ void write_picture(const Arguments& a, const Picture& picture, const Scene& scen
   options.title = printable(bar_title(scene, mesh));
   const bool named = std::find(color_map_names().begin(), color_map_names().end(), a.color_map) != color_map_names().end();
   options.colors = bar_colors(scene, color_map(named ? std::string_view(a.color_map) : "viridis"));
+  if (a.outline)
+    for (const auto& [x0, y0, x1, y1] :
+         box_edges(mesh.domain_lower(), mesh.domain_upper(), scene.view, picture.width, picture.height))
+      options.lines.push_back({x0, y0, x1, y1});
   write_png(picture, path, options);
 }
 
@@ -244,6 +251,7 @@ int run(Arguments a) {
   check_arguments(a);
   const bool data = is_data_set(a.input);
   const Drawn d = data ? describe_data(a) : read_scene_file(a);
+  a.outline = a.outline || (data && !a.no_outline);
   a.color_bar = a.color_bar || (data && !a.no_color_bar);
   if (!a.save_scene.empty())
     write_atomically(a.save_scene, point_experiment(d.scene, d.scene.builds.front(), d.scene.renders.front()).dump(1) + "\n");
@@ -271,6 +279,8 @@ void add_render_command(CLI::App& app, Command& chosen) {
   CLI::Option* bar =
       c->add_flag("--color-bar", a->color_bar, "a bar with the colours' values; beside pictures of data sets anyway");
   c->add_flag("--no-color-bar", a->no_color_bar, "the picture alone")->excludes(bar);
+  CLI::Option* outline = c->add_flag("--outline", a->outline, "the domain's edges behind the picture; of data sets anyway");
+  c->add_flag("--no-outline", a->no_outline, "without them")->excludes(outline);
   c->add_option("--context", a->context, "egl, egl_device or osmesa; overrides the scene's");
   c->add_option("--memory-limit", a->memory_limit, "for the structure, as 512MiB");
   add_set_option(*c, a->set);

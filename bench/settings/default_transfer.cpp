@@ -54,20 +54,36 @@ void add_slope(Shape& shape, double from, double to, double top) {
   shape.opacity.push_back({to, top});
 }
 
-Shape shape_of(const std::optional<Hidden>& background) {
-  constexpr double kNear = 0.3;  // of the axis: a background this near to an end leaves nothing to see beyond it
-  Shape shape;
-  const Hidden hidden = background.value_or(Hidden{0, 0, 0});
-  const bool falls = hidden.middle > kNear;
-  const bool rises = hidden.middle < 1 - kNear;
-  const double longest = std::max(falls ? hidden.from : 0, rises ? 1 - hidden.to : 0);
-  if (falls) {
-    add_slope(shape, hidden.from, 0, hidden.from / longest);
-    std::reverse(shape.opacity.begin(), shape.opacity.end());
+/// How far from the background, 0 to 1, a place of the axis lies: what is far stands out.
+class Distance {
+ public:
+  explicit Distance(const std::optional<Hidden>& background) : hidden_(background.value_or(Hidden{0, 0, 0})) {
+    constexpr double kNear = 0.3;  // of the axis: a background this near to an end leaves nothing to see beyond it
+    falls_ = hidden_.middle > kNear;
+    rises_ = hidden_.middle < 1 - kNear;
+    longest_ = std::max(falls_ ? hidden_.from : 0, rises_ ? 1 - hidden_.to : 0);
   }
-  if (rises) add_slope(shape, hidden.to, 1, (1 - hidden.to) / longest);
-  return shape;
-}
+  double at(double place) const {
+    const double below = falls_ ? hidden_.from - place : 0, above = rises_ ? place - hidden_.to : 0;
+    return std::clamp(std::max(below, above) / longest_, 0.0, 1.0);
+  }
+  /// Opacity from this distance on.
+  Shape shape(double least) const {
+    Shape shape;
+    const double gap = least * longest_;
+    if (falls_ && hidden_.from > gap) {
+      add_slope(shape, hidden_.from - gap, 0, hidden_.from / longest_);
+      std::reverse(shape.opacity.begin(), shape.opacity.end());
+    }
+    if (rises_ && hidden_.to + gap < 1) add_slope(shape, hidden_.to + gap, 1, (1 - hidden_.to) / longest_);
+    return shape;
+  }
+
+ private:
+  Hidden hidden_;
+  bool falls_, rises_;
+  double longest_;
+};
 
 /// Is the field one of differences, such as a velocity?
 bool signed_values(const ShownRange& range) {
@@ -129,32 +145,31 @@ void walk(const AmrHierarchy& mesh, const Vec3d& origin, const Vec3d& direction,
   }
 }
 
-/// Extinction times length along a ray from `origin` toward `target`, world; length in domain edges, or in world units.
-double depth_along(const AmrHierarchy& mesh, int field, const TransferFunction& tf, const WorldRay& ray) {
+/// What a ray passes through.
+struct Piece {
+  double value;
+  double length;  ///< in the domain's longest edges
+};
+using Pieces = std::vector<Piece>;
+
+Pieces pieces_along(const AmrHierarchy& mesh, int field, const WorldRay& ray) {
   const Vec3d spacing = mesh.spacing(mesh.finest_level());
   const Vec3d size = mesh.domain_upper() - mesh.domain_lower();
   const double unit = std::max({spacing.x, spacing.y, spacing.z});
   const Vec3d along = ray.direction * (unit / spacing);  // finest cells a `unit` of world length
-  const double longest = std::max({size.x, size.y, size.z});
-  const double per_length = tf.length_unit == TransferFunction::LengthUnit::world ? unit : unit / longest;
-  double depth = 0;
+  const double per_length = unit / std::max({size.x, size.y, size.z});
+  Pieces pieces;
   walk(mesh, (ray.origin - mesh.domain_lower()) / spacing, along, [&](const LeafCell& leaf, double length) {
     const double value = mesh.value(leaf, field);
-    if (std::isfinite(value)) depth += tf.extinction_at(value) * length * per_length;
+    if (std::isfinite(value) && length > 0) pieces.push_back({value, length * per_length});
   });
-  return depth;
+  return pieces;
 }
 
-double median(std::vector<double>& depths) {
-  if (depths.empty()) return 0;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
-}
-
-/// Rays through the middles of cells that have some extinction: where the picture's grid passes between them.
-std::vector<double> aimed_depths(const AmrHierarchy& mesh, int field, const TransferFunction& tf, const View& view) {
-  constexpr std::int64_t kMost = 512;
+/// Middles of cells that `wanted` chooses by their value, world: at most 512, spread evenly over the mesh's order.
+template <class Wanted>
+std::vector<Vec3d> some_cells(const AmrHierarchy& mesh, int field, Wanted&& wanted) {
+  constexpr std::size_t kMost = 512;
   std::vector<Vec3d> places;
   std::int64_t stride = 1, seen = 0;
   for (int level = mesh.finest_level(); level >= 0; --level) {
@@ -164,44 +179,97 @@ std::vector<double> aimed_depths(const AmrHierarchy& mesh, int field, const Tran
       const auto& values = patches[p].values[static_cast<std::size_t>(field)];
       const Vec3i size = patches[p].box.size();
       for (std::size_t i = 0; i < values.size(); ++i) {
-        if (leaf[i] == 0 || !std::isfinite(values[i]) || !(tf.extinction_at(values[i]) > 0) || seen++ % stride != 0) continue;
+        if (leaf[i] == 0 || !std::isfinite(values[i]) || !wanted(values[i]) || seen++ % stride != 0) continue;
         const auto n = static_cast<std::int64_t>(i);
         const Vec3i cell(n % size.x, n / size.x % size.y, n / size.x / size.y);
         places.push_back(mesh.domain_lower() + (Vec3d(patches[p].box.lower + cell) + 0.5) * mesh.spacing(level));
-        if (static_cast<std::int64_t>(places.size()) < kMost) continue;
+        if (places.size() < kMost) continue;
         for (std::size_t k = 0; 2 * k < places.size(); ++k) places[k] = places[2 * k];  // every other one
         places.resize(places.size() / 2);
         stride *= 2;
       }
     }
   }
+  return places;
+}
+
+/// Rays of a picture, and where few of a grid meet what `wanted` chooses, rays through cells that it chooses.
+template <class Wanted>
+std::vector<Pieces> rays_of(const AmrHierarchy& mesh, int field, const View& view, double aspect, Wanted&& wanted) {
+  constexpr std::size_t kEnough = 24;
+  const int width = std::max(1, static_cast<int>(std::lround(kRays * std::clamp(aspect, 1.0, 16.0))));
+  const int height = std::max(1, static_cast<int>(std::lround(kRays * std::clamp(1 / aspect, 1.0, 16.0))));
+  const CameraFrame camera = camera_frame(view, width, height);
+  std::vector<Pieces> rays;
+  std::size_t hits = 0;
+  const auto add = [&](const WorldRay& ray) {
+    Pieces pieces = pieces_along(mesh, field, ray);
+    if (pieces.empty()) return;
+    if (std::any_of(pieces.begin(), pieces.end(), [&](const Piece& p) { return wanted(p.value); })) ++hits;
+    rays.push_back(std::move(pieces));
+  };
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) add(camera_ray(camera, x, y, width, height));
+  if (hits >= kEnough) return rays;
+  for (const Vec3d& place : some_cells(mesh, field, wanted)) {
+    const Vec3d way = place - view.eye;
+    const double scale = std::max({std::abs(way.x), std::abs(way.y), std::abs(way.z)});
+    if (scale > 0) add({view.eye, glm::normalize(way / scale)});
+  }
+  return rays;
+}
+
+double median(std::vector<double>& list) {
+  if (list.empty()) return 0;
+  const auto middle = list.begin() + static_cast<std::ptrdiff_t>(list.size() / 2);
+  std::nth_element(list.begin(), middle, list.end());
+  return *middle;
+}
+
+double median_depth_of(const std::vector<Pieces>& rays, const TransferFunction& tf, double longest_edge) {
+  const double per_length = tf.length_unit == TransferFunction::LengthUnit::world ? longest_edge : 1;
   std::vector<double> depths;
-  for (const Vec3d& place : places) {
-    const double scale =
-        std::max({std::abs(place.x - view.eye.x), std::abs(place.y - view.eye.y), std::abs(place.z - view.eye.z)});
-    if (!(scale > 0)) continue;
-    const double depth = depth_along(mesh, field, tf, {view.eye, glm::normalize((place - view.eye) / scale)});
+  for (const Pieces& ray : rays) {
+    double depth = 0;
+    for (const Piece& p : ray) depth += tf.extinction_at(p.value) * p.length * per_length;
     if (depth > 0) depths.push_back(depth);
   }
-  return depths;
+  return median(depths);
+}
+
+double longest_edge_of(const AmrHierarchy& mesh) {
+  const Vec3d size = mesh.domain_upper() - mesh.domain_lower();
+  return std::max({size.x, size.y, size.z});
+}
+
+/// Where extinction begins, as a distance from the background: so far that half of the rays which meet some reach values of the
+/// upper half. A wide faint rim would hide them: a picture shows what its rays meet first.
+double first_distance(const std::vector<Pieces>& rays, const Distance& distance, const ValueHistogram& axis) {
+  constexpr double kReached = 0.55, kMost = 0.45, kStep = 0.025;
+  std::vector<double> farthest;
+  for (const Pieces& ray : rays) {
+    double most = 0;
+    for (const Piece& p : ray) most = std::max(most, distance.at(std::clamp(axis.place(p.value), 0.0, 1.0)));
+    farthest.push_back(most);
+  }
+  double least = 0;
+  for (; least < kMost; least += kStep) {
+    std::vector<double> seen;
+    std::copy_if(farthest.begin(), farthest.end(), std::back_inserter(seen), [&](double d) { return d > least; });
+    if (median(seen) >= kReached) break;
+  }
+  return least;
+}
+
+/// Extinction whose median depth along these rays is kMedianDepth.
+void scale_to_rays(TransferFunction& tf, const std::vector<Pieces>& rays, double longest_edge) {
+  const double depth = median_depth_of(rays, tf, longest_edge);
+  if (!(depth > 0) || !std::isfinite(depth)) return;
+  // three digits: nobody wants to read more of them in a scene
+  for (auto& p : tf.extinction) p.extinction = std::stod(fmt::format("{:.3g}", p.extinction * (kMedianDepth / depth)));
 }
 
 }  // namespace
-
-double median_depth(const AmrHierarchy& mesh, int field, const TransferFunction& tf, const View& view, double aspect) {
-  const int width = std::max(1, static_cast<int>(std::lround(kRays * std::max(1.0, std::min(aspect, 16.0)))));
-  const int height = std::max(1, static_cast<int>(std::lround(kRays * std::max(1.0, std::min(1 / aspect, 16.0)))));
-  const CameraFrame camera = camera_frame(view, width, height);
-  std::vector<double> depths;
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x)
-      if (const double depth = depth_along(mesh, field, tf, camera_ray(camera, x, y, width, height)); depth > 0)
-        depths.push_back(depth);
-  constexpr std::size_t kEnough = 24;
-  if (depths.size() < kEnough)
-    for (const double depth : aimed_depths(mesh, field, tf, view)) depths.push_back(depth);
-  return median(depths);
-}
 
 double opacity_length(const AmrHierarchy& mesh) {
   const Vec3d size = mesh.domain_upper() - mesh.domain_lower();
@@ -209,11 +277,9 @@ double opacity_length(const AmrHierarchy& mesh) {
   return longest * glm::length(size / longest) / std::cbrt(static_cast<double>(std::max<std::int64_t>(1, mesh.leaf_cells())));
 }
 
-void scale_to_view(TransferFunction& tf, const AmrHierarchy& mesh, int field, const View& view, double aspect) {
-  const double depth = median_depth(mesh, field, tf, view, aspect);
-  if (!(depth > 0) || !std::isfinite(depth)) return;
-  // three digits: nobody wants to read more of them in a scene
-  for (auto& p : tf.extinction) p.extinction = std::stod(fmt::format("{:.3g}", p.extinction * (kMedianDepth / depth)));
+double median_depth(const AmrHierarchy& mesh, int field, const TransferFunction& tf, const View& view, double aspect) {
+  const auto rays = rays_of(mesh, field, view, aspect, [&](double v) { return tf.extinction_at(v) > 0; });
+  return median_depth_of(rays, tf, longest_edge_of(mesh));
 }
 
 TransferFunction default_transfer(const AmrHierarchy& mesh, int field, const View& view, double aspect,
@@ -232,11 +298,17 @@ TransferFunction default_transfer(const AmrHierarchy& mesh, int field, const Vie
     const double value = place == 0 ? range.lower : place == 1 ? range.upper : histogram.value_at(place);
     if (tf.extinction.empty() || value > tf.extinction.back().value) tf.extinction.push_back({value, extinction});
   };
-  if (range.constant)
+  if (range.constant) {
     add(0.5, 1);  // one value: its box
-  else
-    for (const auto& [place, opacity] : shape_of(background_of(histogram)).opacity) add(place, opacity);
-  scale_to_view(tf, mesh, field, view, aspect);
+    scale_to_rays(tf, rays_of(mesh, field, view, aspect, [](double) { return true; }), longest_edge_of(mesh));
+    return tf;
+  }
+  constexpr double kStandsOut = 0.3;
+  const Distance distance(background_of(histogram));
+  const auto place = [&](double v) { return std::clamp(histogram.place(v), 0.0, 1.0); };
+  const auto rays = rays_of(mesh, field, view, aspect, [&](double v) { return distance.at(place(v)) > kStandsOut; });
+  for (const auto& [at, opacity] : distance.shape(first_distance(rays, distance, histogram)).opacity) add(at, opacity);
+  scale_to_rays(tf, rays, longest_edge_of(mesh));
   return tf;
 }
 

@@ -26,9 +26,6 @@ inline constexpr double kMedianDepth = 1;
 TransferFunction default_transfer(const AmrHierarchy& mesh, int field, const View& view, double aspect,
                                   const TransferRequest& request = {});
 
-/// Scales the extinction of a transfer function to kMedianDepth.
-void scale_to_view(TransferFunction& transfer_function, const AmrHierarchy& mesh, int field, const View& view, double aspect);
-
 /// World length that an opacity is meant over where nobody says: the domain's diagonal by the cube root of its leaf cells, about
 /// the width of a cell. ParaView begins with it, too.
 double opacity_length(const AmrHierarchy& mesh);

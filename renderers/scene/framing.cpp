@@ -104,6 +104,31 @@ View framing_view(const Vec3d& lower, const Vec3d& upper, std::string_view name,
   return view;
 }
 
+std::vector<std::array<double, 4>> box_edges(const Vec3d& lower, const Vec3d& upper, const View& view, int width, int height) {
+  const CameraFrame camera = camera_frame(view, width, height);
+  struct Corner {
+    double x, y;
+    bool seen;
+  };
+  std::array<Corner, 8> corners;
+  for (std::size_t i = 0; i < 8; ++i) {
+    const Vec3d corner((i & 1) != 0 ? upper.x : lower.x, (i & 2) != 0 ? upper.y : lower.y, (i & 4) != 0 ? upper.z : lower.z);
+    const Vec3d way = corner - camera.eye;
+    const double ahead = glm::dot(way, camera.forward);
+    const double scale = camera.orthographic ? 1 : ahead;
+    const double u = glm::dot(way, camera.right) / glm::dot(camera.right, camera.right) / scale;
+    const double v = glm::dot(way, camera.up) / glm::dot(camera.up, camera.up) / scale;
+    corners[i] = {(u + 1) / 2 * width, (1 - v) / 2 * height, camera.orthographic || ahead > 0};
+  }
+  std::vector<std::array<double, 4>> edges;
+  for (std::size_t i = 0; i < 8; ++i)
+    for (const std::size_t bit : {1, 2, 4}) {
+      const Corner &a = corners[i], &b = corners[i | bit];
+      if ((i & bit) == 0 && a.seen && b.seen) edges.push_back({a.x, a.y, b.x, b.y});
+    }
+  return edges;
+}
+
 View parse_camera_line(const std::vector<std::string>& words) {
   const std::string line = fmt::format("{}", fmt::join(words, " "));
   std::vector<double> numbers;

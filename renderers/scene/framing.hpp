@@ -1,6 +1,7 @@
 // Views that show the whole domain, and camera lines of other programs.
 #pragma once
 
+#include <array>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,6 +17,10 @@ const std::vector<std::string_view>& framing_names();
 /// and looks at smaller ones. z is up; seen along z, y is. The projected box fills a picture of this shape, width over height,
 /// up to a margin, on at least two opposite sides. Throws UsageError for another name.
 View framing_view(const Vec3d& lower, const Vec3d& upper, std::string_view name, double aspect);
+
+/// The edges of a box in a picture, in pixels from its upper left corner: x0, y0, x1, y1. Those that reach behind the eye are
+/// left out.
+std::vector<std::array<double, 4>> box_edges(const Vec3d& lower, const Vec3d& upper, const View& view, int width, int height);
 
 /// "ex ey ez ax ay az ux uy uz", and then, if one likes, "-fovy degrees" or "--fov degrees" (ExaBricks, hayStack). Throws
 /// UsageError.

@@ -48,6 +48,11 @@ struct PngColor {
   std::array<double, 3> rgb;
 };
 
+/// A line of the picture's background, pixels from its upper left corner.
+struct PngLine {
+  double x0, y0, x1, y1;
+};
+
 struct PngOptions {
   std::array<double, 3> background{0, 0, 0};  ///< linear RGB behind premultiplied colour
   bool transparent = false;                   ///< the picture's own alpha in its place
@@ -57,6 +62,7 @@ struct PngOptions {
   /// Four channels: what the bar shows, over values. One channel: a map over 0 to 1, which is laid over the picture's range;
   /// empty: viridis.
   std::vector<PngColor> colors;
+  std::vector<PngLine> lines;  ///< behind four-channel pictures with a background, a faint colour that it sets off
 };
 /// 8-bit sRGB to look at; one-channel pictures through a colour map over their range.
 void write_png(const Picture& picture, const std::filesystem::path& path, const PngOptions& options = {});

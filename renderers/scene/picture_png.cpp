@@ -155,14 +155,44 @@ Canvas with_bar(const Picture& picture, const Bar& bar, const PngOptions& option
   return canvas;
 }
 
+/// How much of each pixel the lines cover.
+std::vector<double> coverage(const Picture& picture, const std::vector<PngLine>& lines) {
+  std::vector<double> covered(static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height));
+  const double half = std::max(0.5, picture.height / 1500.0);  // of the line's width
+  for (const PngLine& line : lines) {
+    const double dx = line.x1 - line.x0, dy = line.y1 - line.y0;
+    const double length = std::hypot(dx, dy);
+    if (!(length > 0) || !std::isfinite(length)) continue;
+    const auto first = [&](double a, double b) { return static_cast<int>(std::max(0.0, std::floor(std::min(a, b) - 2 * half))); };
+    const auto last = [&](double a, double b, int most) {
+      return static_cast<int>(std::clamp(std::ceil(std::max(a, b) + 2 * half), 0.0, static_cast<double>(most)));
+    };
+    for (int y = first(line.y0, line.y1); y < last(line.y0, line.y1, picture.height); ++y)
+      for (int x = first(line.x0, line.x1); x < last(line.x0, line.x1, picture.width); ++x) {
+        const double px = x + 0.5 - line.x0, py = y + 0.5 - line.y0;
+        const double along = std::clamp((px * dx + py * dy) / length, 0.0, length);
+        const double away = std::hypot(px - along * dx / length, py - along * dy / length);
+        double& c = covered[static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.width) + static_cast<std::size_t>(x)];
+        c = std::max(c, std::clamp(half + 0.5 - away, 0.0, 1.0));
+      }
+  }
+  return covered;
+}
+
 Canvas draw_light(const Picture& picture, const PngOptions& options) {
   Canvas canvas = with_bar(picture, Bar({options.colors, options.logarithmic}, options.title, picture.height), options);
+  const std::vector<double> covered = coverage(picture, options.transparent ? std::vector<PngLine>() : options.lines);
+  const double line = srgb_from_linear(options.background[1]) < 0.5 ? linear_from_srgb(0.36) : linear_from_srgb(0.72);
   for (int y = 0; y < picture.height; ++y)
     for (int x = 0; x < picture.width; ++x) {
       const double* p = picture.pixel(x, y);
+      const double c_line =
+          covered[static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.width) + static_cast<std::size_t>(x)];
       Rgb linear{};
-      for (std::size_t c = 0; c < 3; ++c)
-        linear[c] = options.transparent ? (p[3] > 0 ? p[c] / p[3] : 0) : p[c] + (1 - p[3]) * options.background[c];
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double behind = options.background[c] + c_line * (line - options.background[c]);
+        linear[c] = options.transparent ? (p[3] > 0 ? p[c] / p[3] : 0) : p[c] + (1 - p[3]) * behind;
+      }
       canvas.set(x, y, display(linear), options.transparent ? p[3] : 1);
     }
   return canvas;
