@@ -22,7 +22,7 @@ COPY = WORK / "source"
 BUILD = WORK / "build"
 
 # what is asked, in this order: first what takes the least time
-SUITES = ("analytic", "differential", "geometry", "metamorphic", "stiff", "convergence", "extreme")
+SUITES = ("analytic", "differential", "geometry", "metamorphic", "stiff", "convergence", "scales", "reference", "extreme")
 # asked where no suite noticed; the same names as their targets
 TESTS = ("conformance_test", "isosurface_test", "integrator_test", "shadow_test", "level_of_detail_test", "octree_test", "page_table_test",
          "kd_tree_test", "uniform_test", "exabricks_test", "leave_out_test")

@@ -40,4 +40,6 @@ if [ $full = yes ]; then
   scripts/check_commands.sh
   scripts/check_compilers.sh
   scripts/check_mutations.py
+  scripts/check_kills.py "build/$preset/amrtex"
+  scripts/check_comparisons.py
 fi

@@ -109,6 +109,54 @@ TEST(Advice, TellsTheNearestWhereNothingReachesTheError) {
   for (const MeasuredCandidate& m : advice.measured) EXPECT_LE(advice.measured[*advice.nearest].error, m.error);
 }
 
+/// The measure, which notes each structure's filter that it hears of.
+Measure listening(const AdviceRequest& request, std::set<Filter>& heard) {
+  return [measure = made_up_measure(request), &heard](std::span<const Candidate> candidates, const Effort& effort) {
+    for (const Candidate& c : candidates) heard.insert(c.build.filter);
+    return measure(candidates, effort);
+  };
+}
+
+TEST(Advice, MeasuresNoFilterThatCannotReachTheError) {
+  AdviceRequest request;
+  std::set<Filter> heard;
+  const Advice advice = advise(request, Effort{}, listening(request, heard), [](const BuildPoint& build, const Effort&) {
+    return std::optional(build.filter == Filter::linear_vertex ? 0.0 : 0.5);
+  });
+  EXPECT_THAT(heard, testing::ElementsAre(Filter::linear_vertex));
+  expect_best_of_measured(advice, request);
+  EXPECT_EQ(advice.lost.size() + 1, candidate_builds(request).size());
+  EXPECT_THAT(advice.lost, Contains(Field(&Loss::reason, HasSubstr("its filter does not reach the error at any step: 0.5"))));
+}
+
+TEST(Advice, GoesOnWithTheNearestFiltersWhereNoneReachesTheError) {
+  AdviceRequest request;
+  std::set<Filter> heard;
+  const Advice advice = advise(request, Effort{}, listening(request, heard), [](const BuildPoint& build, const Effort&) {
+    return std::optional(build.filter == Filter::basis ? 0.2 : 0.5);
+  });
+  EXPECT_THAT(heard, testing::ElementsAre(Filter::basis));
+}
+
+TEST(Advice, TriesALevelOfDetailBesideTheWhole) {
+  AdviceRequest request;
+  const std::size_t whole = candidate_settings(request).size();
+  request.level_of_detail = 2;
+  const std::vector<RenderSettings> all = candidate_settings(request);
+  EXPECT_EQ(all.size(), 2 * whole);
+  std::set<std::string> texts;
+  for (const RenderSettings& settings : all) texts.insert(settings_text(settings));
+  EXPECT_EQ(texts.size(), all.size());
+  std::set<std::string> drawn;
+  advise(request, Effort{}, [&](std::span<const Candidate> candidates, const Effort& effort) {
+    for (const Candidate& c : candidates)
+      if (c.settings.level_of_detail) drawn.insert(c.build.encoding);
+    return made_up_measure(request)(candidates, effort);
+  });
+  for (const std::string& name : drawn) EXPECT_TRUE(find_encoding(name).level_of_detail().ok) << name;
+  EXPECT_FALSE(drawn.empty());
+}
+
 TEST(Advice, TellsTheSmallestStructureWhereNothingFits) {
   AdviceRequest request;
   request.memory_limit = 100;
@@ -177,6 +225,7 @@ TEST(Candidates, MakeScenesThatCanBeRead) {
     "transfer_function": {"extinction": [[0, 0], [1, 9]], "color": [[0, 0, 0, 1]]}})");
   AdviceRequest request;
   request.tolerance = 0.125;
+  request.level_of_detail = 1.5;
   for (const RenderSettings& settings : candidate_settings(request)) {
     const Candidate candidate{candidate_builds(request).back(), settings};
     const Experiment read = parse_scene(scene_with(scene, candidate).dump(), "scene");
@@ -202,7 +251,8 @@ TEST(Advice, IsGoodOnASmallMeshThatIsReallyMeasured) {
   RunOptions options;
   options.folder = name;
   const Effort full{96, 96, 1, 0};
-  const Advice advice = advise(request, full, measure_by_running(scene, request, options));
+  const Advice advice = advise(request, full, measure_by_running(scene, request, options),
+                               filter_error_by_reference(scene, request, options));
   expect_best_of_measured(advice, request);
   EXPECT_EQ(load_records(name).front().at("experiment"), "advise");
 

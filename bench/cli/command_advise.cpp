@@ -11,6 +11,7 @@
 #include "bench/measure/advise.hpp"
 #include "bench/records/record.hpp"
 #include "structures/mesh/quoted.hpp"
+#include "structures/mesh/whole_file.hpp"
 #include "structures/readers/mesh_io.hpp"
 
 namespace amrtex {
@@ -26,6 +27,7 @@ struct Arguments {
   std::vector<std::string> filters, storages, filterings;
   double tolerance = 1e-2;
   int width = 512, height = 512, frames = 5;
+  std::optional<double> level_of_detail;
   bool json = false;
 };
 
@@ -115,6 +117,7 @@ AdviceRequest request_of(const Arguments& a) {
   choose(request.filters, a.filters, parse_filter);
   choose(request.storages, a.storages, parse_storage);
   choose(request.filterings, a.filterings, parse_filtering);
+  request.level_of_detail = a.level_of_detail;
   if (a.reference == "own")
     request.reference.reset();
   else
@@ -138,6 +141,7 @@ Json measured_json(const MeasuredCandidate& m) {
           {"integrator", integrator_name(s.integrator)},
           {"step", by_tolerance ? Json() : Json(s.step)},
           {"tolerance", by_tolerance ? Json(s.tolerance) : Json()},
+          {"level_of_detail", s.level_of_detail ? Json(*s.level_of_detail) : Json()},
           {"frame_ms", m.frame_ms},
           {"bytes", m.bytes},
           {"p95", m.error},
@@ -229,7 +233,8 @@ int run(const Arguments& a) {
   const Folder folder(a.keep);
   options.folder = folder.path();
   const Effort full{a.width, a.height, a.frames, 1};
-  const Advice advice = advise(request, full, measure_by_running(experiment, request, options), progress);
+  const Advice advice = advise(request, full, measure_by_running(experiment, request, options),
+                               filter_error_by_reference(experiment, request, options), progress);
 
   if (a.json) fmt::print("{}\n", advice_json(a, request, advice, scene).dump(2));
   if (!advice.chosen) {
@@ -266,6 +271,9 @@ void add_advise_command(CLI::App& app, Command& chosen) {
   c->add_option("--filter", a->filters, "filters to try; the linear ones otherwise")->allow_extra_args(false)->delimiter(',');
   c->add_option("--storage", a->storages, "storages to try; r32f, r16, r8 otherwise")->allow_extra_args(false)->delimiter(',');
   c->add_option("--filtering", a->filterings, "hardware, manual; both otherwise")->allow_extra_args(false)->delimiter(',');
+  c->add_option("--level-of-detail", a->level_of_detail,
+                "pixels; cells that are smaller on the picture may be drawn as their coarser ones: tried as well")
+      ->check(CLI::PositiveNumber);
   c->add_option("--reference", a->reference, "filter that pictures are held against; linear_vertex otherwise. own: each its own");
   c->add_option("--transfer-function", a->transfer_function,
                 "JSON file or the JSON itself (docs/experiments.md); a ramp over the field's range otherwise");

@@ -5,8 +5,8 @@
 #include <sstream>
 
 #include "bench/cli/commands.hpp"
-#include "bench/records/record.hpp"
 #include "bench/settings/settings_text.hpp"
+#include "structures/mesh/whole_file.hpp"
 
 namespace amrtex {
 namespace {

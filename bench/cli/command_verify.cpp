@@ -3,11 +3,11 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 
 #include "bench/cli/commands.hpp"
 #include "bench/measure/environment.hpp"
 #include "bench/verify/verify.hpp"
+#include "structures/mesh/whole_file.hpp"
 
 namespace amrtex {
 namespace {
@@ -27,25 +27,13 @@ std::string summary(const verify::Report& report, const Context& gl) {
                      report.skipped.size());
 }
 
-void write_file(const std::filesystem::path& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  if (!file.flush()) throw Error(fmt::format("{}: cannot be written", path.string()));
-}
-
-/// Before minutes of work, not after them.
-void make_folder(const std::filesystem::path& folder) {
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  if (failed) throw Error(fmt::format("{}: cannot be made: {}", folder.string(), failed.message()));
-}
-
 /// DIR/verify.json; table.md, the list and what was skipped; cases.csv, every case.
 void write_folder(const std::filesystem::path& folder, const verify::Report& report, const Json& json, const Context& gl) {
-  write_file(folder / "verify.json", json.dump() + "\n");
-  write_file(folder / "table.md", fmt::format("{}\n\n{}\n{}\n{}\n", summary(report, gl), to_markdown(verify::coverage(report)),
-                                              to_markdown(verify::ranges(report)), to_markdown(verify::skipped(report))));
-  write_file(folder / "cases.csv", to_csv(verify::all_cases(report)));
+  write_atomically(folder / "verify.json", json.dump() + "\n");
+  write_atomically(folder / "table.md",
+                   fmt::format("{}\n\n{}\n{}\n{}\n", summary(report, gl), to_markdown(verify::coverage(report)),
+                               to_markdown(verify::ranges(report)), to_markdown(verify::skipped(report))));
+  write_atomically(folder / "cases.csv", to_csv(verify::all_cases(report)));
 }
 
 int run(const Arguments& a) {
@@ -53,7 +41,7 @@ int run(const Arguments& a) {
   for (const std::string& name : a.suites) chosen.push_back(&verify::find_suite(name));
   if (chosen.empty())
     for (const verify::Suite& s : verify::suites()) chosen.push_back(&s);
-  if (!a.output.empty()) make_folder(a.output);
+  if (!a.output.empty()) make_folder(a.output);  // before minutes of work, not after them
   verify::VerifyOptions options;
   options.context = parse_context_kind(a.context);
   options.full = a.full;

@@ -6,8 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <memory>
 #include <set>
 
+#include "bench/measure/judgement.hpp"
+#include "bench/measure/loaded_data.hpp"
 #include "bench/measure/scene_data.hpp"
 #include "bench/numbers/pareto.hpp"
 #include "bench/records/record.hpp"
@@ -21,6 +24,7 @@ constexpr int kCoarseShare = 4;       ///< of the full picture's width and heigh
 constexpr int kLeastCoarseEdge = 64;  ///< pixels
 constexpr int kCoarseFrames = 3;
 constexpr double kCoarseSlack = 1.3;         ///< a structure is dropped where its small picture misses the tolerance by more
+constexpr std::size_t kLeastKept = 2;        ///< that go on where all miss it: their numbers say how far the goal is
 constexpr std::size_t kCoarseShapes = 8;     ///< structures tried with all storages and filterings
 constexpr std::size_t kCoarseBuilds = 12;    ///< structures drawn with all steps
 constexpr std::size_t kCarefulSettings = 8;  ///< settings measured at full size, at a time
@@ -53,7 +57,8 @@ std::string shape_key(const BuildPoint& b) {
 }
 
 std::string settings_key(const RenderSettings& settings) {
-  return fmt::format("{} {} {}", integrator_name(settings.integrator), settings.step, settings.tolerance);
+  return fmt::format("{} {} {} {}", integrator_name(settings.integrator), settings.step, settings.tolerance,
+                     settings.level_of_detail.value_or(0));
 }
 
 std::string key_of(const Candidate& c) { return build_key(c.build) + " " + settings_key(c.settings); }
@@ -92,9 +97,9 @@ std::optional<Reading> reading_of(const Json& record, const AdviceRequest& reque
 /// What successive halving goes through.
 class Search {
  public:
-  Search(const AdviceRequest& request, const Effort& full, const Measure& measure,
+  Search(const AdviceRequest& request, const Effort& full, const Measure& measure, const FilterError& filter_error,
          const std::function<void(const std::string&)>& progress)
-      : request_(request), full_(full), measure_(measure), progress_(progress) {
+      : request_(request), full_(full), measure_(measure), filter_error_(filter_error), progress_(progress) {
     coarse_ = full;
     coarse_.width = coarse_edge(full.width);
     coarse_.height = coarse_edge(full.height);
@@ -102,9 +107,9 @@ class Search {
   }
 
   Advice run() {
-    std::map<std::string, std::vector<BuildPoint>> shapes;
+    Shapes shapes;
     for (const BuildPoint& build : candidate_builds(request_)) shapes[shape_key(build)].push_back(build);
-    const std::vector<MeasuredCandidate> first = one_of_each_shape(shapes);
+    const std::vector<MeasuredCandidate> first = one_of_each_shape(with_good_filters(shapes));
     const std::vector<BuildPoint> best = fastest_builds(within_slack(first), kCoarseShapes);
     std::vector<MeasuredCandidate> builds = measured(other_variants(best, shapes), coarse_, "storages and filterings");
     for (const MeasuredCandidate& m : first)
@@ -117,10 +122,34 @@ class Search {
   }
 
  private:
+  using Shapes = std::map<std::string, std::vector<BuildPoint>>;
+
   static int coarse_edge(int full) { return std::min(full, std::max(kLeastCoarseEdge, full / kCoarseShare)); }
 
+  /// Those whose filter can reach the tolerance, or comes nearest to it.
+  Shapes with_good_filters(const Shapes& shapes) {
+    std::map<std::string, double> errors;
+    for (const auto& [shape, builds] : shapes)
+      if (const auto error = filter_error_(builds.front(), coarse_)) errors[shape] = *error;
+    std::vector<double> ascending;
+    for (const auto& [shape, error] : errors) ascending.push_back(error);
+    std::sort(ascending.begin(), ascending.end());
+    double bound = request_.tolerance * kCoarseSlack;
+    if (ascending.size() == shapes.size() && ascending.front() > bound)
+      bound = ascending[std::min(ascending.size(), kLeastKept) - 1];
+    Shapes good;
+    for (const auto& [shape, builds] : shapes) {
+      const auto error = errors.find(shape);
+      if (error == errors.end() || error->second <= bound)
+        good[shape] = builds;
+      else
+        lose(builds.front(), fmt::format("its filter does not reach the error at any step: {:.2g}", error->second));
+    }
+    return good;
+  }
+
   /// Each shape in the first storage that fits, with the finest steps: what that cannot reach, no other storage reaches.
-  std::vector<MeasuredCandidate> one_of_each_shape(const std::map<std::string, std::vector<BuildPoint>>& shapes) {
+  std::vector<MeasuredCandidate> one_of_each_shape(const Shapes& shapes) {
     std::vector<MeasuredCandidate> all;
     std::set<std::string> fitting;
     for (const Storage storage : request_.storages) {
@@ -139,8 +168,7 @@ class Search {
   }
 
   /// The other storages and filterings of builds, but for those whose storage is known not to fit.
-  std::vector<Candidate> other_variants(const std::vector<BuildPoint>& of,
-                                        const std::map<std::string, std::vector<BuildPoint>>& shapes) const {
+  std::vector<Candidate> other_variants(const std::vector<BuildPoint>& of, const Shapes& shapes) const {
     std::vector<Candidate> all;
     for (const BuildPoint& build : of)
       for (const BuildPoint& other : shapes.at(shape_key(build)))
@@ -152,7 +180,7 @@ class Search {
   static std::string storage_key(const BuildPoint& b) { return shape_key(b) + " " + std::string(format_name(b.storage)); }
 
   /// A shape that was left behind takes its other storages and filterings along.
-  void pass_reasons_on(const std::map<std::string, std::vector<BuildPoint>>& shapes) {
+  void pass_reasons_on(const Shapes& shapes) {
     for (const auto& [shape, builds] : shapes)
       for (const BuildPoint& known : builds) {
         const auto reason = reasons_.find(build_key(known));
@@ -225,7 +253,7 @@ class Search {
     }
     if (!left.empty() || all.empty()) return left;
     std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.error < b.error; });
-    all.resize(std::min<std::size_t>(all.size(), 2));
+    all.resize(std::min(all.size(), kLeastKept));
     return all;
   }
 
@@ -256,6 +284,7 @@ class Search {
     for (const BuildPoint& build : builds)
       for (const RenderSettings& settings : candidate_settings(request_)) {
         if (!interpolates(build.filter) && settings.integrator == Integrator::tolerance) continue;
+        if (settings.level_of_detail && !find_encoding(build.encoding).level_of_detail().ok) continue;
         all.push_back({build, settings});
       }
     return all;
@@ -355,6 +384,7 @@ class Search {
   const AdviceRequest& request_;
   Effort full_, coarse_;
   const Measure& measure_;
+  const FilterError& filter_error_;
   const std::function<void(const std::string&)>& progress_;
   Advice advice_;
   std::map<std::string, Loss> reasons_;         ///< by structure
@@ -404,15 +434,38 @@ std::vector<RenderSettings> candidate_settings(const AdviceRequest& request) {
   RenderSettings by_tolerance = with(Integrator::tolerance, RenderSettings{}.step);
   by_tolerance.tolerance = request.tolerance;
   all.push_back(by_tolerance);
+  if (!request.level_of_detail) return all;
+  const std::size_t whole = all.size();
+  for (std::size_t i = 0; i < whole; ++i) {
+    all.push_back(all[i]);
+    all.back().level_of_detail = request.level_of_detail;
+  }
   return all;
 }
 
-Advice advise(const AdviceRequest& request, const Effort& full, const Measure& measure,
+Advice advise(const AdviceRequest& request, const Effort& full, const Measure& measure, const FilterError& filter_error,
               const std::function<void(const std::string&)>& progress) {
   if (!(request.tolerance > 0 && request.tolerance <= 1))
     throw UsageError(
         fmt::format("a tolerance of {}; accepted: a number in (0, 1], the largest error of a channel", request.tolerance));
-  return Search(request, full, measure, progress).run();
+  return Search(request, full, measure, filter_error, progress).run();
+}
+
+FilterError filter_error_by_reference(const Experiment& scene, const AdviceRequest& request, const RunOptions& options) {
+  if (!request.reference) return [](const BuildPoint&, const Effort&) { return std::nullopt; };
+  struct Asked {
+    Experiment experiment;
+    LoadedData data;
+    explicit Asked(const Experiment& e) : experiment(e), data(experiment, 0) {}
+  };
+  const auto asked = std::make_shared<Asked>(scene);
+  asked->experiment.reference = ReferenceSettings{.common_filter = request.reference, .own = true};
+  return [asked, folder = options.folder / "references"](const BuildPoint& build, const Effort& effort) -> std::optional<double> {
+    RenderPoint render = asked->experiment.renders.front();
+    render.settings.width = effort.width;
+    render.settings.height = effort.height;
+    return filter_error(asked->experiment, asked->data, {build, render}, folder);
+  };
 }
 
 Measure measure_by_running(const Experiment& scene, const AdviceRequest& request, const RunOptions& options) {
@@ -433,6 +486,7 @@ Measure measure_by_running(const Experiment& scene, const AdviceRequest& request
       render.settings.integrator = c.settings.integrator;
       render.settings.step = c.settings.step;
       render.settings.tolerance = c.settings.tolerance;
+      render.settings.level_of_detail = c.settings.level_of_detail;
       render.settings.width = effort.width;
       render.settings.height = effort.height;
       render.frames = effort.frames;
@@ -443,6 +497,7 @@ Measure measure_by_running(const Experiment& scene, const AdviceRequest& request
       wanted.insert(key_of(c));
     }
     RunOptions run = options;
+    run.pictures = run.count_work = false;
     run.wanted = [&](const BuildPoint& b, const RenderPoint& r) { return wanted.contains(key_of({b, r.settings})); };
     run_experiment(experiment, run);
     std::map<std::string, Json> by_configuration;
@@ -467,8 +522,10 @@ std::string build_text(const BuildPoint& build) {
 }
 
 std::string settings_text(const RenderSettings& settings) {
-  if (settings.integrator == Integrator::tolerance) return fmt::format("tolerance {}", settings.tolerance);
-  return fmt::format("{}, step {}", integrator_name(settings.integrator), settings.step);
+  const std::string detail =
+      settings.level_of_detail ? fmt::format(", level of detail {} pixels", *settings.level_of_detail) : std::string();
+  if (settings.integrator == Integrator::tolerance) return fmt::format("tolerance {}{}", settings.tolerance, detail);
+  return fmt::format("{}, step {}{}", integrator_name(settings.integrator), settings.step, detail);
 }
 
 Json scene_with(Json scene, const Candidate& candidate) {
@@ -484,6 +541,7 @@ Json scene_with(Json scene, const Candidate& candidate) {
     scene["render"]["tolerance"] = candidate.settings.tolerance;
   else
     scene["render"]["step"] = candidate.settings.step;
+  if (candidate.settings.level_of_detail) scene["render"]["level_of_detail"] = *candidate.settings.level_of_detail;
   return scene;
 }
 

@@ -23,6 +23,8 @@ struct AdviceRequest {
   std::vector<Filter> filters{interpolating_filters().begin(), interpolating_filters().end()};
   std::vector<Storage> storages = {Storage::r32f, Storage::r16, Storage::r8};
   std::vector<Filtering> filterings = {Filtering::hardware, Filtering::manual};
+  /// Where there is one, each way to draw is tried with it as well, of encodings that know how (scene key level_of_detail).
+  std::optional<double> level_of_detail;
   /// What pictures are held against; absent: each against its own filter, and then filters do not compete.
   std::optional<Filter> reference = Filter::linear_vertex;
 };
@@ -42,6 +44,10 @@ struct Effort {
 
 /// A record (bench/records/record.hpp) for each candidate, in their order.
 using Measure = std::function<std::vector<Json>(std::span<const Candidate>, const Effort&)>;
+
+/// The error that a structure's filter has at any step and in any storage: such as only filters make, or absent where filters do not
+/// compete. Sees pictures of the effort's size.
+using FilterError = std::function<std::optional<double>(const BuildPoint&, const Effort&)>;
 
 /// A candidate that was measured at full size. Errors are those that the request asks about.
 struct MeasuredCandidate {
@@ -82,16 +88,20 @@ std::vector<BuildPoint> candidate_builds(const AdviceRequest& request);
 /// Ways to draw that are worth trying, from the fastest to the most exact of each integrator.
 std::vector<RenderSettings> candidate_settings(const AdviceRequest& request);
 
-/// Measures small pictures with a fine step: every encoding, parameter and filter in the first storage that fits, then the
-/// best of them in all storages and filterings, then the best of those with all steps; and the best settings at the effort
-/// `full`. `progress` hears what goes on. Throws UsageError for a tolerance outside of (0, 1].
+/// Leaves behind filters that cannot reach the tolerance. Then measures small pictures with a fine step: every encoding, parameter and
+/// filter in the first storage that fits, then the best of them in all storages and filterings, then the best of those with all steps; and
+/// the best settings at the effort `full`. `progress` hears what goes on. Throws UsageError for a tolerance outside of (0, 1].
 Advice advise(
     const AdviceRequest& request, const Effort& full, const Measure& measure,
+    const FilterError& filter_error = [](const BuildPoint&, const Effort&) { return std::nullopt; },
     const std::function<void(const std::string&)>& progress = [](const std::string&) {});
 
 /// Measures by `run_experiment` below `options.folder`; data set, view and transfer function are those of `scene`, whose
 /// mode is `dvr`.
 Measure measure_by_running(const Experiment& scene, const AdviceRequest& request, const RunOptions& options);
+
+/// By the double reference, kept below `options.folder`.
+FilterError filter_error_by_reference(const Experiment& scene, const AdviceRequest& request, const RunOptions& options);
 
 /// "page_table (page_size 8), linear_page, r16, hardware".
 std::string build_text(const BuildPoint& build);

@@ -79,7 +79,7 @@ Json common_error(const JudgedPicture& judged, Filter filter) {
   Json error = error_json(compare(judged.picture, shared), hash);
   error["p95"] = percentile(pixel_errors(judged.picture, shared), 0.95);
   error["p95_seen"] = percentile(seen_errors(judged.picture, shared), 0.95);
-  error["filter"] = filter_name(common.filter);
+  error["filter"] = filter_name(filter);
   return error;
 }
 
@@ -147,6 +147,16 @@ void draw_references(const Experiment& experiment, LoadedData& data, const std::
     } catch (const Error&) {  // the point's own record tells it
     }
   }
+}
+
+double filter_error(const Experiment& experiment, LoadedData& data, const AskedPoint& point, const std::filesystem::path& references) {
+  const Scene scene = reference_scene(experiment, scene_of(experiment, point.render));
+  const auto drawn = [&](const FilterDefinition& filter) {
+    return cached_reference(request_of(experiment, data, scene, filter), references).picture;
+  };
+  return percentile(seen_errors(drawn(own_definition(data.mesh(), point.build)),
+                                drawn(common_definition(data.mesh(), experiment.reference->common_filter.value()))),
+                    0.95);
 }
 
 std::optional<Judgement> add_errors(Json& record, const JudgedPicture& judged) {

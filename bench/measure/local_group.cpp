@@ -18,7 +18,7 @@ PointMeasurer& LocalGroups::of(std::size_t dataset) {
   measurer_.reset();  // two meshes at a time may be too many
   measurer_ = std::make_unique<PointMeasurer>(
       experiment_, dataset,
-      MeasuringOptions{options_.folder, options_.pictures, shader_cache_, experiment_.context, phase_});
+      MeasuringOptions{options_.folder, options_.pictures, options_.count_work, shader_cache_, experiment_.context, phase_});
   return *measurer_;
 }
 

@@ -185,7 +185,7 @@ Json PointMeasurer::measure_one(const BuildPoint& build, Built& built, const Ren
   if (!add_check(record, experiment_, build, scene.settings, own)) return record;  // a wrong picture gets no time
   if (options_.pictures) keep_picture(record, picture, own);
   options_.phase(Phase::drawing);
-  timed(shares_, Share::compilation, [&] { add_work(record, *consumer); });
+  if (options_.count_work) timed(shares_, Share::compilation, [&] { add_work(record, *consumer); });
   if (render.frames > 0) add_times(record, render, *consumer);
   if (experiment_.time_change) add_change(record, built, scene);
   return record;

@@ -31,6 +31,7 @@ enum class Phase { building, drawing, other };
 struct MeasuringOptions {
   std::filesystem::path folder;  ///< of pictures and references
   bool pictures = true;
+  bool count_work = true;
   Json shader_cache;           ///< state of the folder of compiled shaders; null where it is the driver's
   std::string context = "egl";  ///< kind
   std::function<void(Phase)> phase = [](Phase) {};

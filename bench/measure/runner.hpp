@@ -21,6 +21,7 @@ struct RunOptions {
   bool keep_old = false;         ///< keep records of another implementation too (environment.hpp)
   bool retry_failed = false;     ///< measure again what has a record `failed`
   bool pictures = true;          ///< keep those that are drawn
+  bool count_work = true;        ///< records say how much was sampled, which takes another shader a point; only in this process
   int repeat = 1;                ///< processes that measure each point
   /// Compiled shaders are kept there for measurements alone (shader_cache.hpp); empty: wherever the driver keeps them.
   std::filesystem::path shader_cache{};

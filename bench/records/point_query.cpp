@@ -31,7 +31,7 @@ struct PointQuery::Node {
 namespace {
 
 using Node = PointQuery::Node;
-using Part = std::unique_ptr<const Node>;
+using NodePtr = std::unique_ptr<const Node>;
 
 constexpr std::array<std::string_view, 6> kOperations = {"=", "!=", "<", "<=", ">", ">="};
 
@@ -96,8 +96,8 @@ class Parser {
  public:
   Parser(std::string_view text, std::string_view what) : text_(text), what_(what) { next(); }
 
-  Part parse() {
-    Part root = alternatives();
+  NodePtr parse() {
+    NodePtr root = alternatives();
     if (token_.kind != Token::Kind::end) fail("`and`, `or` or the end");
     return root;
   }
@@ -144,20 +144,20 @@ class Parser {
   bool takes_symbol(std::string_view symbol) { return takes(Token::Kind::symbol, symbol); }
 
   template <class Inner>
-  Part joined(Node::Kind kind, std::string_view word, Inner&& inner) {
+  NodePtr joined(Node::Kind kind, std::string_view word, Inner&& inner) {
     auto node = std::make_unique<Node>();
     node->kind = kind;
     node->parts.push_back(inner());
     while (takes_word(word)) node->parts.push_back(inner());
     return node;
   }
-  Part alternatives() {
+  NodePtr alternatives() {
     return joined(Node::Kind::any, "or", [&] { return joined(Node::Kind::all, "and", [&] { return factor(); }); });
   }
 
-  Part factor() {
+  NodePtr factor() {
     if (++depth_ > 100) fail("at most 100 parentheses and `not` inside each other");
-    Part part;
+    NodePtr part;
     if (takes_word("not")) {
       auto node = std::make_unique<Node>();
       node->kind = Node::Kind::none;
@@ -173,7 +173,7 @@ class Parser {
     return part;
   }
 
-  Part comparison() {
+  NodePtr comparison() {
     auto node = std::make_unique<Node>();
     node->place = key();
     if (takes_word("in")) {
@@ -233,7 +233,7 @@ class Parser {
 }  // namespace
 
 bool PointQuery::Node::holds(const Json& point) const {
-  const auto part_holds = [&](const Part& part) { return part->holds(point); };
+  const auto part_holds = [&](const NodePtr& part) { return part->holds(point); };
   switch (kind) {
     case Kind::all:
       return std::all_of(parts.begin(), parts.end(), part_holds);

@@ -116,14 +116,14 @@ RecordLines parse_record_lines(std::string_view text, const std::string& name) {
     ++number;
     if (end == std::string_view::npos) {
       lines.torn = true;
-      lines.warnings.push_back(fmt::format("{}:{}: the last line is cut off: its point is measured again", name, number));
+      lines.warnings.push_back(fmt::format("{}:{}: the last line is cut off and left out; `amrtex run` measures its point again", name, number));
       break;
     }
     Line line = read_line(text.substr(at, end - at), fmt::format("{}:{}", name, number));
     if (line.problem.empty())
       records[key_of(line.record)] = std::move(line.record);
     else
-      lines.warnings.push_back(fmt::format("{}:{}: {}: its point is measured again", name, number, line.problem));
+      lines.warnings.push_back(fmt::format("{}:{}: {}; the line is left out, and `amrtex run` measures its point again", name, number, line.problem));
     at = end + 1;
     lines.whole_bytes = at;
   }
