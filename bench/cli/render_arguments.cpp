@@ -8,6 +8,7 @@
 #include "renderers/scene/framing.hpp"
 #include "renderers/scene/transfer_import.hpp"
 #include "structures/mesh/quoted.hpp"
+#include "structures/mesh/whole_file.hpp"
 #include "structures/readers/mesh_io.hpp"
 
 namespace amrtex {
@@ -68,6 +69,23 @@ std::vector<std::string> SceneArguments::overrides() const {
   }
   if (!camera.empty()) set.push_back("views=" + to_json(camera_view()).dump());
   return set;
+}
+
+std::string SceneArguments::experiment_of(const std::string& input, const std::string& folder) const {
+  if (!is_data_set(input)) {
+    if (!of_data_alone().empty() || !overrides().empty())
+      throw UsageError(fmt::format("{}: an experiment says itself what is drawn; accepted: --set, or a data set in its place",
+                                   clipped(input)));
+    return input;
+  }
+  if (folder.empty()) throw UsageError("--out is missing: the folder for the experiment of the data set and its records");
+  const AmrHierarchy mesh = read_data_set(input, field);
+  SceneRequest wanted = request(input, mesh);
+  if (size.empty()) wanted.width = wanted.height = 256;  // times compare as well, and references take their time
+  const std::filesystem::path file = std::filesystem::path(folder) / "experiment.json";
+  make_folder(folder);
+  write_atomically(file, default_experiment(mesh, wanted).dump(1) + "\n");
+  return file.string();
 }
 
 SceneRequest SceneArguments::request(const std::string& data, const AmrHierarchy& mesh) const {

@@ -23,6 +23,9 @@ struct SceneArguments {
   /// The others, as `--set` takes them.
   std::vector<std::string> overrides() const;
   View camera_view() const;
+  /// Of a data set: an experiment of it, written into the folder; else the file as it is. Throws UsageError where options of a
+  /// data set stand beside an experiment.
+  std::string experiment_of(const std::string& input, const std::string& folder) const;
   SceneRequest request(const std::string& data, const AmrHierarchy& mesh) const;
 };
 

@@ -98,6 +98,11 @@ Json default_experiment(const AmrHierarchy& mesh, const SceneRequest& request) {
     {"name": "octree", "filters": "linear_lod", "filtering": "manual"},
     {"name": "kd_tree", "filters": ["linear_lod", "linear_vertex"]},
     {"name": "exabricks", "filters": "basis"}])");
+  if (!request.encoding.empty()) experiment["encodings"] = Json::array({{{"name", request.encoding}}});
+  if (!request.filter.empty()) {
+    for (Json& encoding : experiment["encodings"]) encoding.erase("filters");
+    experiment["filters"] = request.filter;
+  }
   experiment["storage"] = {"r32f", "r16", "r8"};
   experiment["render"]["step"] = {2, 1};
   experiment["frames"] = 5;

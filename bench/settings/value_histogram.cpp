@@ -197,14 +197,38 @@ ShownRange shown_range(const AmrHierarchy& mesh, int field) {
   return shown_range(mesh, field, false);
 }
 
+namespace {
+
+constexpr double kLeastShare = 1e-6;  ///< of the volume: bars are over its logarithm, so that rare values are seen
+
+/// Length of a bar, 0 to 1.
+double bar_length(double share, double most) {
+  return share > kLeastShare ? std::clamp(std::log(share / kLeastShare) / std::log(most / kLeastShare), 0.0, 1.0) : 0;
+}
+
+double largest_share(const ValueHistogram& histogram) {
+  return std::max(kLeastShare * 10, *std::max_element(histogram.share.begin(), histogram.share.end()));
+}
+
+}  // namespace
+
+std::string sparkline(const ValueHistogram& histogram) {
+  constexpr std::array<const char*, 9> kHeights{" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
+  std::string text;
+  for (const double share : histogram.share) {
+    const int eighths = static_cast<int>(std::lround(8 * bar_length(share, largest_share(histogram))));
+    text += kHeights[static_cast<std::size_t>(std::max(share > 0 ? 1 : 0, eighths))];
+  }
+  return text;
+}
+
 std::string histogram_text(const ValueHistogram& histogram, int width) {
   constexpr std::array<const char*, 9> kEighths{"", "▏", "▎", "▍", "▌", "▋", "▊", "▉", "█"};
-  constexpr double kLeast = 1e-6;  // of the volume: bars are over its logarithm, so that rare values are seen
-  const double most = std::max(kLeast * 10, *std::max_element(histogram.share.begin(), histogram.share.end()));
+  const double most = largest_share(histogram);
   std::string text;
   const auto row = [&](const std::string& label, double share) {
-    const double length = share > kLeast ? std::log(share / kLeast) / std::log(most / kLeast) * (width - 26) : 0;
-    const int eighths = std::max(share > 0 ? 1 : 0, static_cast<int>(std::lround(8 * std::min(length, width - 26.0))));
+    const double length = bar_length(share, most) * std::max(8, width - 28);
+    const int eighths = std::max(share > 0 ? 1 : 0, static_cast<int>(std::lround(8 * length)));
     std::string bar;
     for (int i = 0; i < eighths / 8; ++i) bar += kEighths[8];
     bar += kEighths[static_cast<std::size_t>(eighths % 8)];

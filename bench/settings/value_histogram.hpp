@@ -43,6 +43,8 @@ ShownRange shown_range(const AmrHierarchy& mesh, int field);
 /// The same of a given axis.
 ShownRange shown_range(const AmrHierarchy& mesh, int field, bool logarithmic);
 
+/// The histogram in one line, a character a bin.
+std::string sparkline(const ValueHistogram& histogram);
 /// The histogram as lines of text, `width` characters wide.
 std::string histogram_text(const ValueHistogram& histogram, int width);
 
