@@ -12,9 +12,9 @@ namespace amrtex {
 namespace {
 
 /// The corners of a box in a picture, -1 to 1 from its left and its bottom.
-std::vector<Vec2d> corners_in_picture(const Vec3d& lower, const Vec3d& upper, const View& view, int width, int height) {
+std::vector<glm::dvec2> corners_in_picture(const Vec3d& lower, const Vec3d& upper, const View& view, int width, int height) {
   const CameraFrame camera = camera_frame(view, width, height);
-  std::vector<Vec2d> places;
+  std::vector<glm::dvec2> places;
   for (int i = 0; i < 8; ++i) {
     const Vec3d corner((i & 1) != 0 ? upper.x : lower.x, (i & 2) != 0 ? upper.y : lower.y, (i & 4) != 0 ? upper.z : lower.z);
     const Vec3d way = corner - camera.eye;
@@ -41,8 +41,8 @@ TEST(Framing, AllCornersLieInThePictureAndFillItWhateverTheShapeAndTheUnit) {
     for (const auto& [width, height] : sizes)
       for (const std::string_view name : framing_names()) {
         const View view = framing_view(d.lower, d.upper, name, static_cast<double>(width) / height);
-        Vec2d low(1), high(-1);
-        for (const Vec2d& p : corners_in_picture(d.lower, d.upper, view, width, height)) {
+        glm::dvec2 low(1), high(-1);
+        for (const glm::dvec2& p : corners_in_picture(d.lower, d.upper, view, width, height)) {
           low = glm::min(low, p);
           high = glm::max(high, p);
         }

@@ -2,6 +2,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <exception>
 
 #include "bench/cli/commands.hpp"
 #include "bench/cli/render_arguments.hpp"
@@ -247,20 +248,60 @@ void draw(const Arguments& a, const Drawn& d, const Scene& drawn, Context& conte
   }
 }
 
+/// What a data set is drawn by where nobody says: the first that holds it. All of them filter linearly.
+struct Choice {
+  const char* encoding;
+  Filter filter;
+};
+constexpr Choice kChoices[] = {{"kd_tree", Filter::linear_vertex}, {"exabricks", Filter::basis}, {"octree", Filter::linear_lod}};
+
+void draw_by_first(const Arguments& a, Drawn& d, const Scene& drawn, Context& context) {
+  std::exception_ptr first;
+  for (const Choice& choice : kChoices) {
+    BuildPoint& build = d.scene.builds.front();
+    if (first) {
+      build.encoding = choice.encoding;
+      build.filter = choice.filter;
+      build.parameters = Json::object();
+    }
+    try {
+      return draw(a, d, drawn, context);
+    } catch (const UnsupportedError&) {
+      if (!first) first = std::current_exception();
+    } catch (const BudgetError&) {
+      if (!first) first = std::current_exception();
+    }
+  }
+  std::rethrow_exception(first);
+}
+
+void save_scene(const Arguments& a, const Drawn& d) {
+  if (!a.save_scene.empty())
+    write_atomically(a.save_scene, point_experiment(d.scene, d.scene.builds.front(), d.scene.renders.front()).dump(1) + "\n");
+}
+
+/// What `--set` and options leave open, the program may choose.
+bool free_encoding(const Arguments& a, const Drawn& d) {
+  return a.encoding.empty() && a.filter.empty() && d.scene.builds.front().encoding == kChoices[0].encoding;
+}
+
 int run(Arguments a) {
   check_arguments(a);
   const bool data = is_data_set(a.input);
-  const Drawn d = data ? describe_data(a) : read_scene_file(a);
+  Drawn d = data ? describe_data(a) : read_scene_file(a);
   a.outline = a.outline || (data && !a.no_outline);
   a.color_bar = a.color_bar || (data && !a.no_color_bar);
-  if (!a.save_scene.empty())
-    write_atomically(a.save_scene, point_experiment(d.scene, d.scene.builds.front(), d.scene.renders.front()).dump(1) + "\n");
-  if (a.output.empty() && !a.explain_error) return 0;
-  Scene drawn = with_tolerance(scene_of(d.scene, d.scene.renders.front()), a.tolerance);
-  drawn.settings.prune = drawn.settings.prune || a.prune;
-  const auto context = make_context(parse_context_kind(a.context.empty() ? d.scene.context : a.context));
-  for (const std::string& warning : scene_warnings(d.mesh, drawn)) fmt::print(stderr, "warning: {}\n", printable(warning));
-  draw(a, d, drawn, *context);
+  if (!a.output.empty() || a.explain_error) {
+    Scene drawn = with_tolerance(scene_of(d.scene, d.scene.renders.front()), a.tolerance);
+    drawn.settings.prune = drawn.settings.prune || a.prune;
+    const auto context = make_context(parse_context_kind(a.context.empty() ? d.scene.context : a.context));
+    for (const std::string& warning : scene_warnings(d.mesh, drawn)) fmt::print(stderr, "warning: {}\n", printable(warning));
+    if (data && free_encoding(a, d))
+      draw_by_first(a, d, drawn, *context);
+    else
+      draw(a, d, drawn, *context);
+  }
+  save_scene(a, d);
   return 0;
 }
 

@@ -81,6 +81,7 @@ TransferFunction default_transfer(const AmrHierarchy& mesh, const SceneRequest& 
 
 Json default_scene(const AmrHierarchy& mesh, const SceneRequest& request) {
   Json scene = common(mesh, request);
+  scene["render"]["step"] = 0.5;
   scene["encodings"] = Json::array({{{"name", request.encoding.empty() ? "kd_tree" : request.encoding}}});
   if (!request.filter.empty())
     scene["filters"] = request.filter;
