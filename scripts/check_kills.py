@@ -12,6 +12,7 @@ import json
 import os
 import pathlib
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -28,7 +29,7 @@ TIMES = {"frame", "build_seconds", "upload_seconds", "first_frame_ms", "process_
 def experiment():
     """The encodings of quickstart, small enough for some seconds."""
     small = experiment_runs.read_experiment("experiments/quickstart/experiment.json")
-    small["render"] = {**small["render"], "width": 48, "height": 48}
+    small["render"] = [{**render, "width": 48, "height": 48} for render in small["render"]]
     small.update(frames=2, warm_up=1)
     return small
 
@@ -61,6 +62,14 @@ def leftovers(folder):
     return [str(p.relative_to(folder)) for p in folder.rglob(".unfinished-*")]
 
 
+def different_files(folder, other):
+    """Pictures and references that are not the same to the byte, or there once alone."""
+    def files(of):
+        return {str(p.relative_to(of)): p.read_bytes() for part in ("pictures", "references") for p in (of / part).iterdir()}
+    one, two = files(folder), files(other)
+    return sorted(name for name in one.keys() | two.keys() if one.get(name) != two.get(name))
+
+
 class Sweep:
     def __init__(self, program, folder):
         self.folder = pathlib.Path(folder)
@@ -70,6 +79,10 @@ class Sweep:
 
     def start(self, name):
         return subprocess.Popen([*self.command, str(self.folder / name)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    def warm(self, name, like):
+        """With the compiled shaders of another folder: a sweep takes seconds then, and kills hit more than compilers."""
+        shutil.copytree(self.folder / like / "shader_cache", self.folder / name / "shader_cache")
 
     def finish(self, name):
         begin = time.monotonic()
@@ -90,12 +103,15 @@ def kill_somebody(process, whom):
 
 def torture(sweep, kills, chance):
     """Problems, and how many kills hit whom."""
-    whole = sweep.finish("undisturbed")
+    sweep.finish("undisturbed")
+    sweep.warm("again", "undisturbed")
+    whole = sweep.finish("again")
     problems, hits, sweeps = [], {"run": 0, "child": 0}, 0
     expected = records_of(sweep.folder / "undisturbed", problems)
     while sum(hits.values()) < kills:
         name = f"tortured_{sweeps}"
         sweeps += 1
+        sweep.warm(name, "undisturbed")
         for _ in range(12):  # then it may end in peace
             process = sweep.start(name)
             whom = chance.choice(("run", "child"))
@@ -111,6 +127,7 @@ def torture(sweep, kills, chance):
             elif found[key] != expected[key]:
                 differing = [k for k in expected[key] if expected[key][k] != found[key].get(k)]
                 problems.append(f"sweep {sweeps}: {key} differs in {', '.join(differing)}")
+        problems += [f"sweep {sweeps}: {file} differs" for file in different_files(sweep.folder / "undisturbed", sweep.folder / name)]
         problems += [f"sweep {sweeps}: left over: {file}" for file in leftovers(sweep.folder / name)]
         print(f"{sum(hits.values())} kills, {sweeps} sweeps, {len(problems)} problems", file=sys.stderr)
     return problems, hits, sweeps, len(expected)

@@ -11,6 +11,7 @@
 #include <set>
 
 #include "bench/records/record.hpp"
+#include "bench/records/record_file.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {

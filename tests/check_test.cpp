@@ -10,6 +10,7 @@
 #include "bench/measure/check_bound.hpp"
 #include "bench/measure/runner.hpp"
 #include "bench/records/record.hpp"
+#include "bench/records/record_file.hpp"
 #include "bench/settings/json_file.hpp"
 #include "structures/mesh/error.hpp"
 

@@ -12,6 +12,7 @@
 #include "bench/measure/left_out_time.hpp"
 #include "bench/measure/runner.hpp"
 #include "bench/records/record.hpp"
+#include "bench/records/record_file.hpp"
 #include "renderers/bindings/scene_needs.hpp"
 #include "structures/common/build_tools.hpp"
 #include "tests/leave_out_cases.hpp"

@@ -8,6 +8,7 @@
 
 #include "bench/measure/runner.hpp"
 #include "bench/records/record.hpp"
+#include "bench/records/record_file.hpp"
 #include "renderers/bindings/scene_bindings.hpp"
 #include "renderers/cpu/cpu_field.hpp"
 #include "structures/generators/random_mesh.hpp"

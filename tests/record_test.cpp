@@ -14,6 +14,7 @@
 #include <iterator>
 #include <set>
 
+#include "bench/measure/environment.hpp"
 #include "bench/records/record_file.hpp"
 #include "structures/mesh/whole_file.hpp"
 
@@ -69,9 +70,9 @@ TEST(BlankRecord, HasEveryFixedKeyInOrder) {
   for (const auto& [key, value] : record.items()) keys.push_back(key);
   EXPECT_THAT(
       keys, testing::ElementsAre("schema", "status", "reason", "experiment", "configuration", "implementation", "repetition",
-                                 "dataset", "encoding", "build_parameters", "filter", "storage", "filtering", "render", "memory",
-                                 "build_seconds", "upload_seconds", "process_peak_bytes", "first_frame_ms", "frame", "work",
-                                 "check", "check_reason", "error", "error_common", "left_out", "image_hash", "context"));
+                                 "asked", "dataset", "encoding", "build_parameters", "filter", "storage", "filtering", "render",
+                                 "memory", "build_seconds", "upload_seconds", "process_peak_bytes", "first_frame_ms", "frame",
+                                 "work", "check", "check_reason", "error", "error_common", "left_out", "image_hash", "context"));
   EXPECT_EQ(complaint(record), "valid");
 }
 
@@ -277,12 +278,22 @@ TEST_F(RecordFolder, TheLastRecordOfAPointStandsForIt) {
 }
 
 TEST_F(RecordFolder, RepetitionsAndContextsStandBesideEachOther) {
-  Json elsewhere = record_of("a", 3);
-  elsewhere["context"]["renderer"] = "another";
+  const auto drawn_by = [](const char* renderer, Json record) {
+    record["context"] = context_json();
+    record["context"].update({{"renderer", renderer},
+                              {"device", "gpu"},
+                              {"gl_version", "4.5"},
+                              {"extensions_missing", Json::array()},
+                              {"shader_hash", "abc"},
+                              {"shader_cache", "warm"}});
+    return record;
+  };
   RecordFile file(folder_);
-  file.append(record_of("a", 1, 0));
-  file.append(record_of("a", 2, 1));
-  file.append(elsewhere);
+  file.append(drawn_by("one", record_of("a", 1, 0)));
+  file.append(drawn_by("one", record_of("a", 2, 1)));
+  file.append(drawn_by("another", record_of("a", 3, 0)));
+  EXPECT_EQ(file.records().size(), 3u);
+  file.append(drawn_by("another", record_of("a", 4, 0)));
   EXPECT_EQ(file.records().size(), 3u);
 }
 
@@ -294,8 +305,8 @@ TEST_F(RecordFolder, WritesNothingThatIsNotValid) {
   EXPECT_EQ(text_of_file(folder_ / "records.jsonl"), "");
 }
 
-// A process that is killed while it writes leaves the beginning of a line: for every length of it the records before are there, and the run
-// that goes on cuts it off.
+// A process that is killed while it writes leaves the beginning of a line: for every length of it the records before are there,
+// and the run that goes on cuts it off.
 TEST_F(RecordFolder, AFileCutAtAnyByteLosesItsLastRecordAlone) {
   const std::string first = record_line(record_of("a")) + "\n", second = record_line(record_of("b")) + "\n";
   const fs::path file = folder_ / "records.jsonl";

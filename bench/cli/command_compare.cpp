@@ -23,15 +23,11 @@ struct Arguments {
   bool json = false;
 };
 
-void warn(const std::vector<std::string>& warnings) {
-  for (const std::string& warning : warnings) fmt::print(stderr, "amrtex: warning: {}\n", one_line(warning, 380));
-}
-
 /// What cannot be read is bad usage here: exit code 1 is that of a finding.
 ComparedFolder read_folder(const std::string& folder) {
   try {
     RecordLines lines = load_record_lines(folder);
-    warn(lines.warnings);
+    print_warnings(lines.warnings);
     return {folder, std::move(lines.records)};
   } catch (const Error& error) {
     throw UsageError(error.what());
@@ -75,7 +71,7 @@ void copy_table_choices(const fs::path& out, const std::vector<fs::path>& inputs
 int merge(const Arguments& a) {
   const std::vector<fs::path> inputs(a.inputs.begin(), a.inputs.end());
   const MergedRecords merged = merge_records(a.out, inputs);
-  warn(merged.warnings);
+  print_warnings(merged.warnings);
   copy_table_choices(a.out, inputs);
   if (a.json)
     fmt::print("{}\n", Json{{"added", merged.added}, {"present", merged.present}, {"renumbered", merged.renumbered}}.dump());

@@ -8,6 +8,7 @@
 #include "bench/measure/measuring_child.hpp"
 #include "bench/measure/measuring_process.hpp"
 #include "bench/records/record.hpp"
+#include "bench/records/record_file.hpp"
 #include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
@@ -22,8 +23,8 @@ Json record_of(const std::filesystem::path& file, const std::string& hash) {
     if (record.value("configuration", Json()).is_string() && record["configuration"].get<std::string>().starts_with(hash))
       if (found.empty() || found.back()["configuration"] != record["configuration"]) found.push_back(std::move(record));
   if (found.size() != 1)
-    throw UsageError(fmt::format("--from-record: {} points of {} begin with {}; accepted: the beginning of one configuration", found.size(),
-                                 file.string(), quote(hash)));
+    throw UsageError(fmt::format("--from-record: {} points of {} begin with {}; accepted: the beginning of one configuration",
+                                 found.size(), file.string(), quote(hash)));
   return found.front();
 }
 
@@ -31,15 +32,17 @@ Experiment experiment_of_record(const RunArguments& a) {
   const std::filesystem::path file = a.record.at(0);
   const Json record = record_of(file, a.record.at(1));
   if (!record.at("asked").is_object())
-    throw UsageError(fmt::format("--from-record: the record {} does not say where its data came from: it is of {}; accepted: records of {}",
-                                 quote(a.record[1]), record.at("schema").get<std::string>(), kRecordSchema));
+    throw UsageError(
+        fmt::format("--from-record: the record {} does not say where its data came from: it is of {}; accepted: records of {}",
+                    quote(a.record[1]), record.at("schema").get<std::string>(), kRecordSchema));
   return parse_experiment(record["asked"].dump(), file, {.set = a.set, .most_points = a.max_points});
 }
 
 }  // namespace
 
 Experiment RunArguments::experiment() const {
-  if (input.empty() && record.empty()) throw UsageError("run: an experiment is required; accepted: a file, or --from-record FILE HASH");
+  if (input.empty() && record.empty())
+    throw UsageError("run: an experiment is required; accepted: a file, or --from-record FILE HASH");
   if (!record.empty()) return experiment_of_record(*this);
   return read_experiment(input, {.set = set, .most_points = max_points});
 }
@@ -55,7 +58,11 @@ RunOptions RunArguments::options() const {
 }
 
 std::vector<std::string> RunArguments::measuring_process() const {
-  std::vector<std::string> words = {std::filesystem::read_symlink("/proc/self/exe").string(), "measure", "--out", output, "--max-points",
+  std::vector<std::string> words = {std::filesystem::read_symlink("/proc/self/exe").string(),
+                                    "measure",
+                                    "--out",
+                                    output,
+                                    "--max-points",
                                     fmt::format("{}", max_points)};
   if (record.empty())
     words.push_back(input);
@@ -74,7 +81,8 @@ std::vector<std::string> RunArguments::measuring_process() const {
 void add_run_arguments(CLI::App& command, RunArguments& a) {
   CLI::Option* input = command.add_option("experiment", a.input, "experiment file (docs/experiments.md)");
   CLI::Option* record =
-      command.add_option("--from-record", a.record, "FILE HASH: the one point of a record, in place of an experiment file")->expected(2);
+      command.add_option("--from-record", a.record, "FILE HASH: the one point of a record, in place of an experiment file")
+          ->expected(2);
   input->excludes(record);
   command.add_option("--out", a.output, "folder for records, pictures and tables")->required();
   command.add_option("--context", a.context, "egl, egl_device or osmesa; overrides the experiment's");

@@ -15,6 +15,7 @@
 #include "bench/measure/sweep_estimate.hpp"
 #include "bench/records/point_query.hpp"
 #include "bench/records/record.hpp"
+#include "bench/records/record_file.hpp"
 #include "bench/report/paper_tables.hpp"
 #include "bench/report/repetitions.hpp"
 #include "bench/report/report.hpp"
@@ -43,11 +44,9 @@ struct Arguments : RunArguments {
   bool json = false;
 };
 
-std::vector<Table> tables_of(const fs::path& folder, const std::string& columns) {
-  const std::vector<Json> records = one_a_point(load_records(folder));
-  if (records.empty()) throw Error(fmt::format("{}: no records; accepted: a folder that `amrtex run` wrote", folder.string()));
+std::vector<Table> ordinary_tables(const fs::path& folder, fs::path columns, const std::vector<Json>& records) {
+  if (columns.empty() && fs::exists(folder / "columns.json")) columns = folder / "columns.json";
   ReportOptions options;
-  if (columns.empty() && fs::exists(folder / "columns.json")) return tables_of(folder, (folder / "columns.json").string());
   if (!columns.empty())
     for (const Json& r : records) options.columns[r.at("experiment")] = read_columns(columns);
   return make_tables(records, options);
@@ -68,12 +67,13 @@ void write_tables(const fs::path& folder, const std::vector<Table>& tables) {
 }
 
 /// Writes the ordinary tables, then those beside a paper; so the first are there when tables.json ends in an error.
-std::vector<Table> write_report(const fs::path& folder, const std::string& columns) {
-  std::vector<Table> tables = tables_of(folder, columns);
+std::vector<Table> write_report(const fs::path& folder, const std::string& columns, const std::vector<Json>& all) {
+  const std::vector<Json> records = one_a_point(all);
+  if (records.empty()) throw Error(fmt::format("{}: no records; accepted: a folder that `amrtex run` wrote", folder.string()));
+  std::vector<Table> tables = ordinary_tables(folder, columns, records);
   write_tables(folder, tables);
   const fs::path file = folder / "tables.json";
   if (!fs::exists(file)) return tables;
-  const std::vector<Json> records = one_a_point(load_records(folder));
   for (Table& table : make_paper_tables(file, records)) tables.push_back(std::move(table));
   const auto add = [&](const auto& made) {
     tables.insert(tables.end(), made.tables.begin(), made.tables.end());
@@ -127,9 +127,9 @@ std::string settings_text(const ListedPoint& p) {
     const Json& value = value_at(s, place);
     return value.is_string() ? value.get<std::string>() : value.dump();
   };
-  return printable(fmt::format("{} {} {} {} {} {} {} {} step {} {}", text("/dataset/name"), text("/encoding"), text("/build_parameters"),
-                               text("/filter"), text("/storage"), text("/filtering"), text("/render/mode"), text("/render/sampling"),
-                               text("/render/step"), text("/render/view_name")));
+  return printable(fmt::format("{} {} {} {} {} {} {} {} step {} {}", text("/dataset/name"), text("/encoding"),
+                               text("/build_parameters"), text("/filter"), text("/storage"), text("/filtering"),
+                               text("/render/mode"), text("/render/sampling"), text("/render/step"), text("/render/view_name")));
 }
 
 int list(const Experiment& experiment, const RunOptions& options, bool json) {
@@ -147,7 +147,8 @@ int list(const Experiment& experiment, const RunOptions& options, bool json) {
 /// Points, structures, and what records of the folder tell of bytes and times.
 int dry_run(const Experiment& experiment, const RunOptions& options) {
   const SweepEstimate e = estimate(list_points(experiment, options), load_known(options.folder), options.repeat);
-  fmt::print("{} points of {} structures in {} data sets, {} of them open\n", e.points, e.structures, experiment.datasets.size(), e.open);
+  fmt::print("{} points of {} structures in {} data sets, {} of them open\n", e.points, e.structures, experiment.datasets.size(),
+             e.open);
   if (e.largest_bytes > 0) fmt::print("largest structure that is known: {} bytes\n", e.largest_bytes);
   if (e.open == 0)
     fmt::print("nothing to do\n");
@@ -171,9 +172,9 @@ void print_summary(const Arguments& a, const RunSummary& s, const std::vector<Ta
   if (a.json) {
     Json shares = Json::object();
     for (std::size_t i = 0; i < kShareNames.size(); ++i) shares[std::string(kShareNames[i])] = s.shares.seconds[i];
-    const Json json{{"measured", s.measured}, {"kept", s.kept},       {"unsupported", s.unsupported}, {"over_budget", s.over_budget},
-                    {"failed", s.failed},     {"left", s.left},       {"seconds", s.seconds},         {"shares", shares},
-                    {"warnings", s.warnings}};
+    const Json json{{"measured", s.measured},       {"kept", s.kept},     {"unsupported", s.unsupported},
+                    {"over_budget", s.over_budget}, {"failed", s.failed}, {"left", s.left},
+                    {"seconds", s.seconds},         {"shares", shares},   {"warnings", s.warnings}};
     fmt::print("{}\n", json.dump());
     return;
   }
@@ -217,16 +218,19 @@ int run(Arguments a) {
   if (a.list_points) return list(experiment, options, a.json);
   if (a.dry_run) return dry_run(experiment, options);
   const RunSummary s = measure(a, experiment, options);
-  for (const std::string& warning : s.warnings) fmt::print(stderr, "amrtex: warning: {}\n", one_line(warning, 380));
+  print_warnings(s.warnings);
   for (const char* name : {"columns.json", "tables.json"}) copy_beside(experiment, a.output, name);
   const bool any = s.measured + s.kept + s.unsupported + s.over_budget + s.failed > 0;
-  print_summary(a, s, any ? write_report(a.output, "") : std::vector<Table>());
-  if (data && !a.json) fmt::print("\n{}\n", verdict(one_a_point(load_records(a.output))));
+  const std::vector<Json> records = any ? load_records(a.output) : std::vector<Json>();
+  print_summary(a, s, any ? write_report(a.output, "", records) : std::vector<Table>());
+  if (data && !a.json) fmt::print("\n{}\n", verdict(one_a_point(records)));
   return s.failed > 0 ? 1 : 0;
 }
 
 int report(const Arguments& a) {
-  const std::vector<Table> tables = write_report(a.input, a.columns);
+  const RecordLines lines = load_record_lines(a.input);
+  print_warnings(lines.warnings);
+  const std::vector<Table> tables = write_report(a.input, a.columns, lines.records);
   for (const Table& t : tables) fmt::print("{}\n", to_markdown(t));
   fmt::print("{0}/table.md, {0}/table.csv, {0}/table.tex\n", a.input);
   return 0;
@@ -276,7 +280,8 @@ void add_run_commands(CLI::App& app, Command& chosen) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   r->add_option("--time-limit", a->time_limit, "seconds after which no further structure is begun")->check(CLI::PositiveNumber);
-  r->add_option("--time-out", a->time_out, "seconds of building and drawing that a point may take; else 10 times the longest, at least 60")
+  r->add_option("--time-out", a->time_out,
+                "seconds of building and drawing that a point may take; else 10 times the longest, at least 60")
       ->check(CLI::PositiveNumber);
   r->add_option("--process-limit", a->process_limit, "memory that a measuring process may allocate, as 8GiB");
   r->add_flag("--list-points", a->list_points, "say which points there are and what became of them, and end");

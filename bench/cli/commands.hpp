@@ -29,6 +29,9 @@ void add_settings_command(CLI::App& app, Command& chosen);
 /// `--set key=value`, any number of times (bench/settings/override.hpp).
 void add_set_option(CLI::App& command, std::vector<std::string>& set);
 
+/// On stderr, a line each.
+void print_warnings(const std::vector<std::string>& warnings);
+
 /// "512MiB", "2GiB", "1000000". Throws UsageError.
 std::int64_t parse_bytes(const std::string& text);
 /// A JSON file, or the JSON itself. Throws UsageError naming the file, or `what` for JSON without one, and the line.

@@ -51,6 +51,10 @@ void print_error(std::string_view what) {
 
 }  // namespace
 
+void amrtex::print_warnings(const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings) fmt::print(stderr, "amrtex: warning: {}\n", one_line(warning, 380));
+}
+
 int main(int argc, char** argv) {
   CLI::App app{"amrtex: GPU encodings of AMR data, compared by memory, frame time and image error"};
   app.require_subcommand(1);

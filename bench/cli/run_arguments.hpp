@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/measure/runner.hpp"
+#include "bench/measure/run_options.hpp"
 
 namespace amrtex {
 

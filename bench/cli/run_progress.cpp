@@ -43,7 +43,8 @@ void RunProgress::show() {
   shown_ = now;
   const double each = done_ > 0 ? duration<double>(now - begin_).count() / done_ : 0;
   const std::string left = done_ > 0 ? duration_text(each * std::max(planned_ - done_, 0)) + " left" : "";
-  const std::string text = fmt::format("{} of {} points{}{}: {}", done_, std::max(planned_, done_), left.empty() ? "" : ", ", left, what_);
+  const std::string text =
+      fmt::format("{} of {} points{}{}: {}", done_, std::max(planned_, done_), left.empty() ? "" : ", ", left, what_);
   if (terminal_)
     fmt::print(stderr, "\r\x1b[K{}", one_line(text, 100));
   else

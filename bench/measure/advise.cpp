@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <set>
@@ -14,6 +15,7 @@
 #include "bench/measure/scene_data.hpp"
 #include "bench/numbers/pareto.hpp"
 #include "bench/records/record.hpp"
+#include "bench/records/record_file.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {
@@ -25,8 +27,10 @@ constexpr int kLeastCoarseEdge = 64;  ///< pixels
 constexpr int kCoarseFrames = 3;
 constexpr double kCoarseSlack = 1.3;         ///< a structure is dropped where its small picture misses the tolerance by more
 constexpr std::size_t kLeastKept = 2;        ///< that go on where all miss it: their numbers say how far the goal is
-constexpr std::size_t kCoarseShapes = 8;     ///< structures tried with all storages and filterings
-constexpr std::size_t kCoarseBuilds = 12;    ///< structures drawn with all steps
+constexpr int kFilterEdge = 64;              ///< pixels; the largest picture by which filters are left behind
+constexpr std::size_t kCoarseShapes = 8;     ///< structures tried with all storages, filterings and steps
+constexpr std::size_t kCoarseBuilds = 4;     ///< structures drawn by the integrators whose shaders take long to compile, too
+constexpr double kReferenceShare = 1e-3;     ///< of the tolerance asked for: what references may be off
 constexpr std::size_t kCarefulSettings = 8;  ///< settings measured at full size, at a time
 constexpr int kCarefulRounds = 3;
 constexpr double kAlike = 1.1;  ///< ratios of times and bytes below it are not told
@@ -109,13 +113,12 @@ class Search {
   Advice run() {
     Shapes shapes;
     for (const BuildPoint& build : candidate_builds(request_)) shapes[shape_key(build)].push_back(build);
-    const std::vector<MeasuredCandidate> first = one_of_each_shape(with_good_filters(shapes));
-    const std::vector<BuildPoint> best = fastest_builds(within_slack(first), kCoarseShapes);
-    std::vector<MeasuredCandidate> builds = measured(other_variants(best, shapes), coarse_, "storages and filterings");
-    for (const MeasuredCandidate& m : first)
-      if (std::any_of(best.begin(), best.end(), [&](const auto& b) { return build_key(b) == build_key(m.candidate.build); }))
-        builds.push_back(m);
-    measure_carefully(measured(with_all_settings(fastest_builds(within_slack(builds), kCoarseBuilds)), coarse_, "steps"));
+    std::vector<MeasuredCandidate> coarse = one_of_each_shape(with_good_filters(shapes));
+    const std::vector<BuildPoint> best = fastest_builds(within_slack(coarse), kCoarseShapes);
+    add(coarse, measured(with_settings(variants(best, shapes), is_cheap), coarse_, "storages, filterings and steps"));
+    const std::vector<BuildPoint> few = fastest_builds(within_slack(best_of_each_build(coarse)), kCoarseBuilds);
+    add(coarse, measured(with_settings(few, [](const RenderSettings& s) { return !is_cheap(s); }), coarse_, "integrators"));
+    measure_carefully(std::move(coarse));
     pass_reasons_on(shapes);
     conclude();
     return std::move(advice_);
@@ -167,14 +170,39 @@ class Search {
     return all;
   }
 
-  /// The other storages and filterings of builds, but for those whose storage is known not to fit.
-  std::vector<Candidate> other_variants(const std::vector<BuildPoint>& of, const Shapes& shapes) const {
-    std::vector<Candidate> all;
+  /// All storages and filterings of builds, but for those whose storage is known not to fit.
+  std::vector<BuildPoint> variants(const std::vector<BuildPoint>& of, const Shapes& shapes) const {
+    std::vector<BuildPoint> all;
     for (const BuildPoint& build : of)
       for (const BuildPoint& other : shapes.at(shape_key(build)))
-        if (build_key(other) != build_key(build) && !too_large_.contains(storage_key(other)))
-          all.push_back({other, finest_settings()});
+        if (!too_large_.contains(storage_key(other))) all.push_back(other);
     return all;
+  }
+
+  /// Does its shader compile quickly?
+  static bool is_cheap(const RenderSettings& settings) { return settings.integrator == Integrator::exponential_midpoint; }
+
+  static void add(std::vector<MeasuredCandidate>& all, std::vector<MeasuredCandidate> more) {
+    all.insert(all.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
+  }
+
+  /// Of each structure the fastest that reaches the tolerance, or else the most exact.
+  std::vector<MeasuredCandidate> best_of_each_build(const std::vector<MeasuredCandidate>& all) const {
+    const auto before = [&](const MeasuredCandidate& a, const MeasuredCandidate& b) {
+      const bool a_reaches = a.error <= request_.tolerance, b_reaches = b.error <= request_.tolerance;
+      if (a_reaches != b_reaches) return a_reaches;
+      return a_reaches ? a.frame_ms < b.frame_ms : a.error < b.error;
+    };
+    std::vector<MeasuredCandidate> best;
+    std::map<std::string, std::size_t> place;
+    for (const MeasuredCandidate& m : all) {
+      const auto [known, is_new] = place.emplace(build_key(m.candidate.build), best.size());
+      if (is_new)
+        best.push_back(m);
+      else if (before(m, best[known->second]))
+        best[known->second] = m;
+    }
+    return best;
   }
 
   static std::string storage_key(const BuildPoint& b) { return shape_key(b) + " " + std::string(format_name(b.storage)); }
@@ -279,10 +307,13 @@ class Search {
     return best;
   }
 
-  std::vector<Candidate> with_all_settings(const std::vector<BuildPoint>& builds) const {
+  /// The builds with those of the settings that are chosen.
+  template <class Chosen>
+  std::vector<Candidate> with_settings(const std::vector<BuildPoint>& builds, Chosen&& chosen) const {
     std::vector<Candidate> all;
     for (const BuildPoint& build : builds)
       for (const RenderSettings& settings : candidate_settings(request_)) {
+        if (!chosen(settings)) continue;
         if (!interpolates(build.filter) && settings.integrator == Integrator::tolerance) continue;
         if (settings.level_of_detail && !find_encoding(build.encoding).level_of_detail().ok) continue;
         all.push_back({build, settings});
@@ -393,6 +424,13 @@ class Search {
   std::map<std::string, double> least_needed_;  ///< bytes, of those over the limit, by encoding
 };
 
+/// Judged by a common filter, or each by its own.
+ReferenceSettings reference_of(const AdviceRequest& request) {
+  ReferenceSettings reference{.common_filter = request.reference, .own = !request.reference};
+  reference.tolerance = std::max(reference.tolerance, kReferenceShare * request.tolerance);
+  return reference;
+}
+
 /// One value for each text, in the order in which they come.
 template <class T, class Text>
 void add_once(std::vector<T>& list, std::set<std::string>& seen, const T& item, Text&& text) {
@@ -459,11 +497,12 @@ FilterError filter_error_by_reference(const Experiment& scene, const AdviceReque
     explicit Asked(const Experiment& e) : experiment(e), data(experiment, 0) {}
   };
   const auto asked = std::make_shared<Asked>(scene);
-  asked->experiment.reference = ReferenceSettings{.common_filter = request.reference, .own = true};
+  asked->experiment.reference = reference_of(request);
+  asked->experiment.reference->own = true;
   return [asked, folder = options.folder / "references"](const BuildPoint& build, const Effort& effort) -> std::optional<double> {
     RenderPoint render = asked->experiment.renders.front();
-    render.settings.width = effort.width;
-    render.settings.height = effort.height;
+    render.settings.width = std::min(effort.width, kFilterEdge);
+    render.settings.height = std::min(effort.height, kFilterEdge);
     return filter_error(asked->experiment, asked->data, {build, render}, folder);
   };
 }
@@ -473,7 +512,7 @@ Measure measure_by_running(const Experiment& scene, const AdviceRequest& request
   const std::string data = exact_data_hash(load_dataset(scene, scene.datasets.front()), scene_of(scene, scene.renders.front()));
   return [scene, request, options, data](std::span<const Candidate> candidates, const Effort& effort) {
     Experiment experiment = scene;
-    experiment.reference = ReferenceSettings{.common_filter = request.reference, .own = !request.reference};
+    experiment.reference = reference_of(request);
     experiment.unchecked_because = "advise reads the error itself";
     if (options.context) experiment.context = context_kind_name(*options.context);
     if (request.memory_limit != std::numeric_limits<std::int64_t>::max()) experiment.memory_limit = request.memory_limit;
@@ -501,10 +540,11 @@ Measure measure_by_running(const Experiment& scene, const AdviceRequest& request
     run.wanted = [&](const BuildPoint& b, const RenderPoint& r) { return wanted.contains(key_of({b, r.settings})); };
     run_experiment(experiment, run);
     std::map<std::string, Json> by_configuration;
-    for (Json& record : load_records(options.folder)) by_configuration[record.at("configuration")] = std::move(record);
+    for (const Json& record : load_records(options.folder)) by_configuration[record.at("configuration")] = record;
     std::vector<Json> records;
     for (std::size_t i = 0; i < candidates.size(); ++i)
-      records.push_back(by_configuration.at(configuration_hash(point_configuration(experiment, candidates[i].build, drawn[i], data))));
+      records.push_back(
+          by_configuration.at(configuration_hash(point_configuration(experiment, candidates[i].build, drawn[i], data))));
     return records;
   };
 }

@@ -88,9 +88,9 @@ std::vector<BuildPoint> candidate_builds(const AdviceRequest& request);
 /// Ways to draw that are worth trying, from the fastest to the most exact of each integrator.
 std::vector<RenderSettings> candidate_settings(const AdviceRequest& request);
 
-/// Leaves behind filters that cannot reach the tolerance. Then measures small pictures with a fine step: every encoding, parameter and
-/// filter in the first storage that fits, then the best of them in all storages and filterings, then the best of those with all steps; and
-/// the best settings at the effort `full`. `progress` hears what goes on. Throws UsageError for a tolerance outside of (0, 1].
+/// Leaves behind filters that cannot reach the tolerance. Then measures small pictures: every encoding, parameter and filter in the first
+/// storage that fits with a fine step, then the best of them in all storages and filterings with all steps, then the best of those by all
+/// integrators; and the best settings at the effort `full`. `progress` hears what goes on. Throws UsageError for a tolerance outside of (0, 1].
 Advice advise(
     const AdviceRequest& request, const Effort& full, const Measure& measure,
     const FilterError& filter_error = [](const BuildPoint&, const Effort&) { return std::nullopt; },

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bench/measure/point_measurer.hpp"
-#include "bench/measure/runner.hpp"
+#include "bench/measure/run_options.hpp"
 
 namespace amrtex {
 

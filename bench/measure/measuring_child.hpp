@@ -8,7 +8,7 @@
 // {"usage_error": "..."}, {"output_error": "..."} or {"error": "..."}, and ends the process.
 #pragma once
 
-#include "bench/measure/runner.hpp"
+#include "bench/measure/run_options.hpp"
 
 namespace amrtex {
 

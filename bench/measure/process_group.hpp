@@ -8,7 +8,7 @@
 
 #include "bench/measure/measuring_process.hpp"
 #include "bench/measure/point_measurer.hpp"
-#include "bench/measure/runner.hpp"
+#include "bench/measure/run_options.hpp"
 #include "bench/measure/stopwatch.hpp"
 
 namespace amrtex {

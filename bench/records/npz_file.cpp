@@ -55,7 +55,8 @@ struct Buffer {
 
 void add_file(zip_t* archive, const std::string& name, const std::string& text) {
   zip_source_t* const source = ::zip_source_buffer(archive, text.data(), text.size(), 0);
-  const zip_int64_t index = source == nullptr ? -1 : ::zip_file_add(archive, name.c_str(), source, ZIP_FL_OVERWRITE | ZIP_FL_ENC_UTF_8);
+  const zip_int64_t index =
+      source == nullptr ? -1 : ::zip_file_add(archive, name.c_str(), source, ZIP_FL_OVERWRITE | ZIP_FL_ENC_UTF_8);
   if (index < 0) {
     ::zip_source_free(source);
     throw Error(fmt::format("{} of a zip file: {}", name, ::zip_strerror(archive)));
@@ -72,7 +73,8 @@ void add_file(zip_t* archive, const std::string& name, const std::string& text) 
 std::string text_of(zip_t* archive, zip_uint64_t index, const std::filesystem::path& path) {
   zip_stat_t stat;
   if (::zip_stat_index(archive, index, 0, &stat) != 0) refuse(path, ::zip_strerror(archive));
-  if (stat.size > static_cast<zip_uint64_t>(kMostBytes)) refuse(path, fmt::format("an array of {} bytes; accepted: {}", stat.size, kMostBytes));
+  if (stat.size > static_cast<zip_uint64_t>(kMostBytes))
+    refuse(path, fmt::format("an array of {} bytes; accepted: {}", stat.size, kMostBytes));
   const std::unique_ptr<zip_file_t, Discard> file(::zip_fopen_index(archive, index, 0));
   if (!file) refuse(path, ::zip_strerror(archive));
   std::string text(stat.size, '\0');

@@ -46,10 +46,11 @@ std::map<std::string, std::string, std::less<>> make_places() {
   };
   add("render");
   const std::initializer_list<std::pair<const char*, const char*>> others = {
-      {"encoding", "/encoding"}, {"encodings", "/encoding"}, {"dataset", "/dataset/name"}, {"datasets", "/dataset/name"},
-      {"field", "/dataset/field"}, {"filter", "/filter"}, {"filters", "/filter"}, {"storage", "/storage"},
-      {"filtering", "/filtering"}, {"view", "/render/view_name"}, {"views", "/render/view_name"},
-      {"transfer_function", "/render/transfer_function_name"}, {"status", "/status"}, {"repetition", "/repetition"}};
+      {"encoding", "/encoding"},     {"encodings", "/encoding"},     {"dataset", "/dataset/name"},
+      {"datasets", "/dataset/name"}, {"field", "/dataset/field"},    {"filter", "/filter"},
+      {"filters", "/filter"},        {"storage", "/storage"},        {"filtering", "/filtering"},
+      {"view", "/render/view_name"}, {"views", "/render/view_name"}, {"transfer_function", "/render/transfer_function_name"},
+      {"status", "/status"},         {"repetition", "/repetition"}};
   for (const auto& [name, place] : others) places[name] = place;
   return places;
 }
@@ -105,7 +106,8 @@ class Parser {
  private:
   [[noreturn]] void fail(std::string_view accepted, std::string_view hint = "") const {
     const std::string found = token_.kind == Token::Kind::end ? "the end" : quote(token_.text);
-    throw UsageError(fmt::format("{}: character {}: {} is not expected; accepted: {}{}", what_, token_.place, found, accepted, hint));
+    throw UsageError(
+        fmt::format("{}: character {}: {} is not expected; accepted: {}{}", what_, token_.place, found, accepted, hint));
   }
 
   static bool is_symbol(char c) { return std::string_view("=!<>(),").find(c) != std::string_view::npos; }

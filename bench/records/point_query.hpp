@@ -10,9 +10,9 @@
 
 namespace amrtex {
 
-/// A condition over the settings of a point. KEY OP VALUE with = != < <= > >=, KEY in (VALUE, ...), joined by not, and, or and parentheses;
-/// `and` binds closer than `or`. KEY is a name of the settings table, a build parameter, or encoding, dataset, filter. VALUE is a word, a
-/// number, or a text between quotes. Two numbers are compared as such, anything else as text.
+/// A condition over the settings of a point. KEY OP VALUE with = != < <= > >=, KEY in (VALUE, ...), joined by not, and, or and
+/// parentheses; `and` binds closer than `or`. KEY is a name of the settings table, a build parameter, or encoding, dataset,
+/// filter. VALUE is a word, a number, or a text between quotes. Two numbers are compared as such, anything else as text.
 class PointQuery {
  public:
   /// Throws UsageError that begins with `what` and names the place in the text, and what is accepted there.

@@ -9,7 +9,6 @@
 #include <system_error>
 
 #include "bench/numbers/statistics.hpp"
-#include "bench/records/record_file.hpp"
 #include "bench/settings/json_file.hpp"
 #include "structures/mesh/error.hpp"
 #include "structures/mesh/quoted.hpp"
@@ -387,8 +386,6 @@ std::string configuration_hash(const Json& configuration) {
   return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
 }
 
-std::vector<Json> load_records(const std::filesystem::path& folder) { return load_record_lines(folder).records; }
-
 std::vector<Json> load_separate_records(const std::filesystem::path& folder) {
   const std::filesystem::path records = folder / "records";
   std::error_code error;
@@ -396,8 +393,9 @@ std::vector<Json> load_separate_records(const std::filesystem::path& folder) {
   for (const auto& entry : std::filesystem::directory_iterator(records, error))
     if (entry.path().extension() == ".json") paths.push_back(entry.path());
   if (error)
-    throw Error(fmt::format("{}: no records: neither records.jsonl nor records.jsonl.gz is there; accepted: a folder that `amrtex run` wrote",
-                            folder.string()));
+    throw Error(fmt::format(
+        "{}: no records: neither records.jsonl nor records.jsonl.gz is there; accepted: a folder that `amrtex run` wrote",
+        folder.string()));
   std::sort(paths.begin(), paths.end());
   std::vector<Json> loaded;
   for (const auto& path : paths) loaded.push_back(read_separate_record(path));

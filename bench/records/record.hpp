@@ -1,5 +1,5 @@
-// One measurement: schema `amrtex-record/2`. Absent is null; 0 is a value. Tables are made from records and nothing else. Records of
-// schema 1 are read, never written. Where they stand: record_file.hpp.
+// One measurement: schema `amrtex-record/2`. Absent is null; 0 is a value. Tables are made from records and nothing else. Records
+// of schema 1 are read, never written. Where they stand: record_file.hpp.
 #pragma once
 
 #include <filesystem>
@@ -42,11 +42,8 @@ void validate_record(const Json& record);
 /// as 1. Throws Error for NaN and infinities, which JSON cannot tell apart from null.
 std::string configuration_hash(const Json& configuration);
 
-/// Every record of a folder that `amrtex run` wrote, or of committed results (record_file.hpp). Throws Error where there is none.
-std::vector<Json> load_records(const std::filesystem::path& folder);
-
-/// Older programs wrote a file a record: DIR/records/<configuration>.json, of schema 1 and early ones of schema 2. One of schema 1 keeps its
-/// name of schema and gets null for each key that came later. Throws Error naming the file that is no valid record.
+/// Older programs wrote a file a record: DIR/records/<configuration>.json, of schema 1 and early ones of schema 2. One of schema
+/// 1 keeps its name of schema and gets null for each key that came later. Throws Error naming the file that is no valid record.
 std::vector<Json> load_separate_records(const std::filesystem::path& folder);
 /// One of these files, where there is any.
 std::optional<std::filesystem::path> separate_record(const std::filesystem::path& folder);

@@ -116,14 +116,17 @@ RecordLines parse_record_lines(std::string_view text, const std::string& name) {
     ++number;
     if (end == std::string_view::npos) {
       lines.torn = true;
-      lines.warnings.push_back(fmt::format("{}:{}: the last line is cut off and left out; `amrtex run` measures its point again", name, number));
+      lines.warnings.push_back(
+          fmt::format("{}:{}: the last line is cut off and left out; `amrtex run` measures its point again", name, number));
       break;
     }
     Line line = read_line(text.substr(at, end - at), fmt::format("{}:{}", name, number));
-    if (line.problem.empty())
-      records[key_of(line.record)] = std::move(line.record);
-    else
-      lines.warnings.push_back(fmt::format("{}:{}: {}; the line is left out, and `amrtex run` measures its point again", name, number, line.problem));
+    if (line.problem.empty()) {
+      const RecordKey key = key_of(line.record);  // before the record is moved from
+      records[key] = std::move(line.record);
+    } else
+      lines.warnings.push_back(
+          fmt::format("{}:{}: {}; the line is left out, and `amrtex run` measures its point again", name, number, line.problem));
     at = end + 1;
     lines.whole_bytes = at;
   }
@@ -140,15 +143,18 @@ RecordLines load_record_lines(const fs::path& folder) {
   return lines;
 }
 
+std::vector<Json> load_records(const fs::path& folder) { return load_record_lines(folder).records; }
+
 RecordFile::RecordFile(const fs::path& folder) : folder_(folder), path_(folder / kFile) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw OutputError(fmt::format("output folder {}: {}", folder.string(), error.message()));
   if (const auto old = separate_record(folder))
-    throw UsageError(fmt::format(
-        "output folder {}: {} is of an older form, which a run does not go on from; accepted: another folder for --out, or this one "
-        "without its folder `records` (`amrtex report` still makes tables of them)",
-        folder.string(), (fs::path("records") / old->filename()).string()));
+    throw UsageError(
+        fmt::format("output folder {}: {} is of an older form, which a run does not go on from; accepted: another folder for "
+                    "--out, or this one "
+                    "without its folder `records` (`amrtex report` still makes tables of them)",
+                    folder.string(), (fs::path("records") / old->filename()).string()));
   descriptor_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
   if (descriptor_ < 0) throw OutputError(fmt::format("{}: cannot be written: {}", path_.string(), reason()));
   try {
@@ -167,9 +173,10 @@ RecordFile::~RecordFile() { ::close(descriptor_); }
 void RecordFile::lock() {
   if (::flock(descriptor_, LOCK_EX | LOCK_NB) == 0) return;
   if (errno == EWOULDBLOCK)
-    throw UsageError(fmt::format("output folder {}: another run measures into it; accepted: another folder for --out, or this one when "
-                                 "that run has ended",
-                                 folder_.string()));
+    throw UsageError(
+        fmt::format("output folder {}: another run measures into it; accepted: another folder for --out, or this one when "
+                    "that run has ended",
+                    folder_.string()));
   warnings_.push_back(fmt::format("output folder {}: its file system has no locks ({}): nothing keeps a second run out of it",
                                   folder_.string(), reason()));
 }
@@ -195,7 +202,8 @@ std::vector<Json> RecordFile::records() const {
 void RecordFile::append(const Json& record) {
   validate_record(record);
   // somebody may have removed the folder: a line in a file that has no name is lost
-  struct stat open_file {}, named{};
+  struct stat open_file {
+  }, named{};
   if (::fstat(descriptor_, &open_file) != 0 || ::stat(path_.c_str(), &named) != 0 || open_file.st_ino != named.st_ino ||
       open_file.st_dev != named.st_dev)
     throw OutputError(fmt::format("{}: is gone, or another file has its name", path_.string()));

@@ -52,8 +52,8 @@ HalfPicture taken(const std::map<std::string, NpyArray>& arrays, const std::stri
   const auto halves = arrays.find(name), scale = arrays.find(name + "_scale");
   if (halves == arrays.end() || scale == arrays.end() || halves->second.type != "<f2" || halves->second.shape.size() != 3 ||
       scale->second.type != "<f8" || scale->second.bytes.size() != 2 * sizeof(double))
-    throw Error(fmt::format("{}: has no {} of half floats with {}_scale: accepted is what `amrtex run` keeps of a point", path.string(), name,
-                            name));
+    throw Error(fmt::format("{}: has no {} of half floats with {}_scale: accepted is what `amrtex run` keeps of a point",
+                            path.string(), name, name));
   std::array<double, 2> numbers{};
   std::memcpy(numbers.data(), scale->second.bytes.data(), sizeof numbers);
   return {halves->second, numbers[0], numbers[1]};

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "bench/settings/settings_table.hpp"
+#include "structures/generators/analytic_fields.hpp"
 
 namespace amrtex {
 namespace {
@@ -50,7 +51,8 @@ void add_transfer_functions(Json& file, const DatasetSource& source, const Rende
     file["transfer_function"] = std::move(first);
     return;
   }
-  first["field"] = source.field ? Json(*source.field) : Json();
+  first["field"] =
+      source.file ? source.field.value() : analytic_field_type(source.generate);  // parse_transfer_functions() sees to both
   Json list = Json::array({std::move(first)});
   for (const FieldTransfer& f : render.more_fields) {
     list.push_back(given_keys(transfer_function_settings(), f.transfer_function));

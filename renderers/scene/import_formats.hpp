@@ -1,11 +1,11 @@
-// The parts of transfer_import.cpp, one a format.
+// What the readers of colour maps share, and one reader a format.
 #pragma once
 
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "renderers/scene/transfer_import.hpp"
+#include "renderers/scene/imported_transfer.hpp"
 #include "structures/mesh/json.hpp"
 
 namespace pugi {
