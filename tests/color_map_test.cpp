@@ -87,7 +87,6 @@ TEST(ColorMap, CoolWarmHasMorelandsEndsAndMiddle) {
   EXPECT_LE(largest(at(map, 0) - Vec3d(59, 76, 192) / 255.0), 1e-3);
   EXPECT_LE(largest(at(map, 1) - Vec3d(180, 4, 38) / 255.0), 1e-3);
   EXPECT_LE(largest(at(map, 0.5) - Vec3d(221, 221, 221) / 255.0), kColorBound + 1.0 / 255);
-  for (const double share : {0.25, 0.75}) EXPECT_GT(lightness(map.back().rgb) + 10, 40) << share;
   EXPECT_LE(largest(diverging_color(Vec3d(59, 76, 192) / 255.0, Vec3d(180, 4, 38) / 255.0, 0.25) - Vec3d(141, 176, 254) / 255.0),
             2.0 / 255);
 }

@@ -62,12 +62,14 @@ struct Search {
 /// The next 16 bits.
 void descend(Search& search, const Digits& digits) {
   std::uint64_t last = 0;
+  double passed = 0;  // by the digits before the last one that holds weight
   for (std::uint64_t d = 0; d < digits.size(); ++d) {
     if (digits[d] == 0) continue;
+    if (digits[last] > 0 && d != last) passed += digits[last];
     last = d;
-    if (digits[d] > search.rest) break;
-    search.rest -= digits[d];
+    if (passed + digits[d] > search.rest) break;
   }
+  search.rest -= passed;
   search.prefix = search.prefix << kDigitBits | last;
 }
 
@@ -124,7 +126,7 @@ double ValueHistogram::value_at(double place) const {
 ValueHistogram value_histogram(const AmrHierarchy& mesh, int field, double lower, double upper, bool logarithmic, int bins) {
   ValueHistogram histogram{lower, upper, logarithmic, std::vector<double>(static_cast<std::size_t>(bins)), 0, 0};
   const std::vector<double> volume = volumes(mesh, CellWeight::volume);
-  const double scale = logarithmic ? bins / std::log(upper / lower) : bins / (upper / 2 - lower / 2);
+  const double extent = logarithmic ? std::log(upper / lower) : upper / 2 - lower / 2;
   double total = 0;
   for_each_value(mesh, field, [&](double v, int level) {
     const double w = volume[static_cast<std::size_t>(level)];
@@ -134,7 +136,7 @@ ValueHistogram value_histogram(const AmrHierarchy& mesh, int field, double lower
     else if (v > upper)
       histogram.above += w;
     else {
-      const double at = scale * (logarithmic ? std::log(v / lower) : v / 2 - lower / 2);
+      const double at = bins * ((logarithmic ? std::log(v / lower) : v / 2 - lower / 2) / extent);
       histogram.share[static_cast<std::size_t>(std::clamp(at, 0.0, bins - 1.0))] += w;
     }
   });

@@ -12,7 +12,7 @@ namespace {
 double round_step(double least) {
   const double power = std::pow(10, std::floor(std::log10(least)));
   for (const double factor : {1.0, 2.0, 5.0})
-    if (factor * power >= least * (1 - 1e-12)) return factor * power;
+    if (factor * power >= least * (1 - 1e-6)) return factor * power;
   return 10 * power;
 }
 
@@ -20,12 +20,12 @@ std::vector<Tick> linear_ticks(double lower, double upper, int most) {
   const double step = round_step((upper / 2 - lower / 2) / (most - 1) * 2);
   std::vector<Tick> list;
   if (!(step > 0) || !std::isfinite(step)) return list;
-  const double first = std::ceil(lower / step - 1e-9);
+  const double first = std::ceil(lower / step - 1e-6);
   const double largest = std::max(std::abs(lower), std::abs(upper));
   const int digits = std::clamp(1 + static_cast<int>(std::floor(std::log10(largest)) - std::floor(std::log10(step))), 1, 15);
   for (int k = 0; k < most; ++k) {
     const double value = (first + k) * step;
-    if (value > upper + 1e-9 * step) break;
+    if (value > upper + 1e-6 * step) break;
     list.push_back({value, fmt::format("{:.{}g}", std::abs(value) < 1e-9 * step ? 0.0 : value, digits)});
   }
   return list;
