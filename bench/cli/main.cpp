@@ -57,6 +57,7 @@ void amrtex::print_warnings(const std::vector<std::string>& warnings) {
 
 int main(int argc, char** argv) {
   CLI::App app{"amrtex: GPU encodings of AMR data, compared by memory, frame time and image error"};
+  app.name("amrtex");
   app.require_subcommand(1);
   app.set_version_flag("--version", "amrtex 0.1.0");
   app.footer("Example: amrtex run experiments/quickstart/experiment.json --out out/quickstart");
