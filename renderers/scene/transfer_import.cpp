@@ -24,6 +24,7 @@ constexpr const char* kFormats =
 std::string bytes_of(const Source& source) {
   constexpr std::uintmax_t kMost = 64 << 20;
   std::error_code failure;
+  if (std::filesystem::is_directory(source.file, failure)) source.fail("a folder; accepted: the name of a colour map, or a file");
   const auto size = std::filesystem::is_regular_file(source.file, failure) ? std::filesystem::file_size(source.file, failure) : 0;
   if (const std::string reason = why_absent(source.file); !reason.empty())
     source.fail(fmt::format("{}; accepted: the name of a colour map, or a file", reason));
