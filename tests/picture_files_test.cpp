@@ -33,6 +33,8 @@ TEST(Ticks, AreRoundNumbersInsideOfTheRange) {
   EXPECT_THAT(texts(ticks(1e6, 1e6 + 4e-3, false, 5)),
               testing::ElementsAre("1000000", "1000000.001", "1000000.002", "1000000.003", "1000000.004"));
   EXPECT_THAT(texts(ticks(1e-31, 1e-28, true, 8)), testing::ElementsAre("1e-31", "1e-30", "1e-29", "1e-28"));
+  EXPECT_THAT(texts(ticks(1e-8, 1e-6, true, 3)), testing::ElementsAre("1e-8", "1e-7", "1e-6"));
+  EXPECT_THAT(texts(ticks(0, 4e7, false, 5)), testing::ElementsAre("0", "1e7", "2e7", "3e7", "4e7"));
   EXPECT_THAT(texts(ticks(1, 20, true, 8)), testing::ElementsAre("1", "2", "5", "10", "20"));
   EXPECT_LE(ticks(1e-200, 1e200, true, 7).size(), 8U);
   EXPECT_GE(ticks(3.1, 3.2, true, 7).size(), 2U) << "no power of ten lies between";

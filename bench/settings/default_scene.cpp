@@ -37,6 +37,11 @@ Json render_of(const AmrHierarchy& mesh, const SceneRequest& request) {
     const ValueHistogram axis{range.lower, range.upper, range.logarithmic, {}, 0, 0};
     render["isovalues"] = {axis.value_at(0.5)};
   }
+  if (request.isovalues.size() > 1) {  // what lies inside is seen through the others
+    std::vector<double> opacity(request.isovalues.size(), 0.35);
+    opacity.back() = 1;
+    render["iso_opacity"] = opacity;
+  }
   return render;
 }
 

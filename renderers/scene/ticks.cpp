@@ -16,6 +16,17 @@ double round_step(double least) {
   return 10 * power;
 }
 
+/// 1e-8 rather than 1e-08.
+std::string number_text(double value, int digits) {
+  std::string text = fmt::format("{:.{}g}", value, digits);
+  const std::size_t e = text.find('e');
+  if (e == std::string::npos) return text;
+  if (text[e + 1] == '+') text.erase(e + 1, 1);
+  const std::size_t first = text[e + 1] == '-' ? e + 2 : e + 1;
+  while (first + 1 < text.size() && text[first] == '0') text.erase(first, 1);
+  return text;
+}
+
 std::vector<Tick> linear_ticks(double lower, double upper, int most) {
   const double step = round_step((upper / 2 - lower / 2) / (most - 1) * 2);
   std::vector<Tick> list;
@@ -26,7 +37,7 @@ std::vector<Tick> linear_ticks(double lower, double upper, int most) {
   for (int k = 0; k < most; ++k) {
     const double value = (first + k) * step;
     if (value > upper + 1e-6 * step) break;
-    list.push_back({value, fmt::format("{:.{}g}", std::abs(value) < 1e-9 * step ? 0.0 : value, digits)});
+    list.push_back({value, number_text(std::abs(value) < 1e-9 * step ? 0.0 : value, digits)});
   }
   return list;
 }
@@ -38,7 +49,7 @@ std::vector<Tick> decade_ticks(double lower, double upper, int most) {
   const bool between = 3 * (last - first + 1) < most;
   std::vector<Tick> list;
   const auto add = [&](double value) {
-    if (value >= lower * (1 - 1e-9) && value <= upper * (1 + 1e-9)) list.push_back({value, fmt::format("{:g}", value)});
+    if (value >= lower * (1 - 1e-9) && value <= upper * (1 + 1e-9)) list.push_back({value, number_text(value, 6)});
   };
   for (int p = first - 1; p <= last; ++p) {
     if (!between && (p < first || (p - first) % every != 0)) continue;
