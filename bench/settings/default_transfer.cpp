@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include "structures/mesh/domain_geometry.hpp"
 #include "structures/mesh/quoted.hpp"
 
 namespace amrtex {

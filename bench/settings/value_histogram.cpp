@@ -16,8 +16,8 @@ namespace amrtex {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kDecades = 3;                           ///< positive values that span more are shown over their logarithm
-constexpr double kMostDecades = 8;                       ///< below the upper end of a logarithmic axis
+constexpr double kDecades = 3;      ///< positive values that span more are shown over their logarithm
+constexpr double kMostDecades = 5;  ///< below the upper end of a logarithmic axis: tails that fall to nothing have no end
 constexpr double kLowShare = 0.005, kHighShare = 0.999;  ///< high values are often the rare ones that a mesh is refined for
 
 /// Calls visit(value, level) for each leaf cell that has a value.

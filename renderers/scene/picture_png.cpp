@@ -83,7 +83,7 @@ Scale unit_scale(const PngOptions& options) {
 /// Sizes in pixels; larger beside larger pictures.
 struct BarLayout {
   int dot, bar, gap, tick;
-  explicit BarLayout(int height) : dot(std::clamp((height + 192) / 384, 1, 8)), bar(10 * dot), gap(5 * dot), tick(3 * dot) {}
+  explicit BarLayout(int height) : dot(std::clamp((height + 320) / 384, 1, 8)), bar(10 * dot), gap(5 * dot), tick(3 * dot) {}
   int text_height() const { return kDotRows * dot; }
   int text_width(std::size_t letters) const { return static_cast<int>(letters) * (kDotColumns + kGlyphGap) * dot; }
 };
