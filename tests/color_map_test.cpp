@@ -11,6 +11,8 @@
 #include <iterator>
 #include <sstream>
 
+#include "bench/verify/meshes.hpp"
+#include "renderers/bindings/transfer_bindings.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {
@@ -96,6 +98,24 @@ TEST(ColorMap, LabGoesThereAndBack) {
     EXPECT_LE(largest(linear_from_lab(lab_from_linear(c)) - c), 1e-6);
   EXPECT_NEAR(lightness(Vec3d(1)), 100, 1e-3);
   EXPECT_NEAR(lightness(Vec3d(0.18418651851244416)), 50, 1e-3);  // ((50 + 16) / 116)^3
+}
+
+/// Colours over 0 to 1, of that many points.
+bool is_exact(std::size_t colors, std::size_t extinctions) {
+  const AmrHierarchy mesh = verify::MeshBuilder({2, 2, 2}).patch(0, {{0, 0, 0}, {2, 2, 2}}, verify::constant(1)).hierarchy();
+  Scene scene;
+  for (std::size_t i = 0; i < colors; ++i)
+    scene.transfer_function.color.push_back({static_cast<double>(i), Vec3d(static_cast<double>(i % 2))});
+  for (std::size_t i = 0; i < extinctions; ++i) scene.transfer_function.extinction.push_back({static_cast<double>(i), 1});
+  SceneBindings bindings;
+  add_transfer_function(mesh, scene, bindings);
+  return bindings.transfer_exact;
+}
+
+TEST(ColorMap, ThirtyTwoColoursAreEvaluatedExactlyAndMoreFromATable) {
+  EXPECT_TRUE(is_exact(32, 16));
+  EXPECT_FALSE(is_exact(33, 16));
+  EXPECT_FALSE(is_exact(2, 17));
 }
 
 TEST(FewestPoints, LeaveWhatLiesOnALineAndKeepCorners) {
