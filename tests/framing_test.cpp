@@ -80,6 +80,14 @@ TEST(Framing, EdgesOfABoxAreTwelveAndMeetItsCorners) {
   EXPECT_LT(box_edges(Vec3d(0), Vec3d(1), inside, 100, 100).size(), 12U);
 }
 
+TEST(Framing, RaysMeetABoxOrPassIt) {
+  EXPECT_TRUE(meets_box({{-1, 0.5, 0.5}, {1, 0, 0}}, Vec3d(0), Vec3d(1)));
+  EXPECT_TRUE(meets_box({Vec3d(0.5), glm::normalize(Vec3d(1, 2, -3))}, Vec3d(0), Vec3d(1))) << "from inside";
+  EXPECT_FALSE(meets_box({{-1, 0.5, 0.5}, {-1, 0, 0}}, Vec3d(0), Vec3d(1))) << "it lies behind";
+  EXPECT_FALSE(meets_box({{-1, 1.5, 0.5}, {1, 0, 0}}, Vec3d(0), Vec3d(1)));
+  EXPECT_FALSE(meets_box({{-1, 0, 0}, glm::normalize(Vec3d(1, 2, 0))}, Vec3d(0), Vec3d(1)));
+}
+
 TEST(CameraLine, IsReadAndWritten) {
   const View view = parse_camera_line("1 2 3  0.5 -4e-1 0  0 0 1 -fovy 40");
   EXPECT_EQ(view.eye, Vec3d(1, 2, 3));

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <limits>
 
 #include "bench/cli/commands.hpp"
 #include "bench/cli/render_arguments.hpp"
@@ -63,6 +64,18 @@ std::string bar_title(const Scene& scene, const AmrHierarchy& mesh) {
   return mesh.fields().front() + (scene.settings.mode == Mode::projection ? " x length" : "");
 }
 
+/// Raw values of rays that pass the domain are none, rather than 0: what lies around it is background.
+Picture without_outside(const Picture& picture, const Scene& scene, const AmrHierarchy& mesh) {
+  if (picture.channels != 1 || scene.settings.mirror) return picture;
+  Picture inside = picture;
+  const CameraFrame camera = camera_frame(scene.view, picture.width, picture.height);
+  for (int y = 0; y < picture.height; ++y)
+    for (int x = 0; x < picture.width; ++x)
+      if (!meets_box(camera_ray(camera, x, y, picture.width, picture.height), mesh.domain_lower(), mesh.domain_upper()))
+        *inside.pixel(x, y) = std::numeric_limits<double>::quiet_NaN();
+  return inside;
+}
+
 void write_picture(const Arguments& a, const Picture& picture, const Scene& scene, const AmrHierarchy& mesh) {
   const fs::path path = a.output;
   if (path.extension() == ".npy") return write_npy(picture, path, a.reference);
@@ -81,7 +94,7 @@ void write_picture(const Arguments& a, const Picture& picture, const Scene& scen
     for (const auto& [x0, y0, x1, y1] :
          box_edges(mesh.domain_lower(), mesh.domain_upper(), scene.view, picture.width, picture.height))
       options.lines.push_back({x0, y0, x1, y1});
-  write_png(picture, path, options);
+  write_png(without_outside(picture, scene, mesh), path, options);
 }
 
 /// An error asked for replaces the scene's step.

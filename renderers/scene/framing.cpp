@@ -129,6 +129,19 @@ std::vector<std::array<double, 4>> box_edges(const Vec3d& lower, const Vec3d& up
   return edges;
 }
 
+bool meets_box(const WorldRay& ray, const Vec3d& lower, const Vec3d& upper) {
+  double from = 0, to = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    const double origin = ray.origin[axis], direction = ray.direction[axis];
+    if (direction == 0 && (origin < lower[axis] || origin > upper[axis])) return false;
+    if (direction == 0) continue;
+    const double a = (lower[axis] - origin) / direction, b = (upper[axis] - origin) / direction;
+    from = std::max(from, std::min(a, b));
+    to = std::min(to, std::max(a, b));
+  }
+  return from < to;
+}
+
 View parse_camera_line(const std::vector<std::string>& words) {
   const std::string line = fmt::format("{}", fmt::join(words, " "));
   std::vector<double> numbers;

@@ -22,6 +22,9 @@ View framing_view(const Vec3d& lower, const Vec3d& upper, std::string_view name,
 /// left out.
 std::vector<std::array<double, 4>> box_edges(const Vec3d& lower, const Vec3d& upper, const View& view, int width, int height);
 
+/// Does a ray meet a box, in front of its origin?
+bool meets_box(const WorldRay& ray, const Vec3d& lower, const Vec3d& upper);
+
 /// "ex ey ez ax ay az ux uy uz", and then, if one likes, "-fovy degrees" or "--fov degrees" (ExaBricks, hayStack). Throws
 /// UsageError.
 View parse_camera_line(const std::string& line);

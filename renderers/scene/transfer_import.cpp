@@ -1,6 +1,7 @@
 #include "renderers/scene/transfer_import.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -27,7 +28,7 @@ std::string bytes_of(const Source& source) {
   if (std::filesystem::is_directory(source.file, failure)) source.fail("a folder; accepted: the name of a colour map, or a file");
   const auto size = std::filesystem::is_regular_file(source.file, failure) ? std::filesystem::file_size(source.file, failure) : 0;
   if (const std::string reason = why_absent(source.file); !reason.empty())
-    source.fail(fmt::format("{}; accepted: the name of a colour map, or a file", reason));
+    source.fail(fmt::format("{}; accepted: a file, or the name of a colour map: {}", reason, fmt::join(color_map_names(), ", ")));
   if (size > kMost) source.fail(fmt::format("{} bytes; no colour map is that large", size));
   std::ifstream in(source.file, std::ios::binary);
   std::string bytes(std::istreambuf_iterator<char>(in), {});
