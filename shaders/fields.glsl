@@ -18,18 +18,18 @@ DEFINE_INT(AMRTEX_LOGARITHMIC_3)
 #endif
 
 UNIFORM_ARRAY(real, u_extinction_points_1, 3 * AMRTEX_EXTINCTION_POINTS_1, 48)
-UNIFORM_ARRAY(real, u_color_points_1, 5 * AMRTEX_COLOR_POINTS_1, 80)
+UNIFORM_ARRAY(real, u_color_points_1, 5 * AMRTEX_COLOR_POINTS_1, 160)
 AMRTEX_EXTINCTION_CURVE(points_extinction_1, u_extinction_points_1, AMRTEX_EXTINCTION_POINTS_1)
 AMRTEX_COLOR_CURVE(points_color_1, u_color_points_1, AMRTEX_COLOR_POINTS_1)
 #if AMRTEX_CPP || AMRTEX_TRANSFERS > 2
 UNIFORM_ARRAY(real, u_extinction_points_2, 3 * AMRTEX_EXTINCTION_POINTS_2, 48)
-UNIFORM_ARRAY(real, u_color_points_2, 5 * AMRTEX_COLOR_POINTS_2, 80)
+UNIFORM_ARRAY(real, u_color_points_2, 5 * AMRTEX_COLOR_POINTS_2, 160)
 AMRTEX_EXTINCTION_CURVE(points_extinction_2, u_extinction_points_2, AMRTEX_EXTINCTION_POINTS_2)
 AMRTEX_COLOR_CURVE(points_color_2, u_color_points_2, AMRTEX_COLOR_POINTS_2)
 #endif
 #if AMRTEX_CPP || AMRTEX_TRANSFERS > 3
 UNIFORM_ARRAY(real, u_extinction_points_3, 3 * AMRTEX_EXTINCTION_POINTS_3, 48)
-UNIFORM_ARRAY(real, u_color_points_3, 5 * AMRTEX_COLOR_POINTS_3, 80)
+UNIFORM_ARRAY(real, u_color_points_3, 5 * AMRTEX_COLOR_POINTS_3, 160)
 AMRTEX_EXTINCTION_CURVE(points_extinction_3, u_extinction_points_3, AMRTEX_EXTINCTION_POINTS_3)
 AMRTEX_COLOR_CURVE(points_color_3, u_color_points_3, AMRTEX_COLOR_POINTS_3)
 #endif

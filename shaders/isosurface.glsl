@@ -218,7 +218,7 @@ void shift_volume(INOUT(Accumulation) a, IN(real) value, IN(real) length, IN(rea
 }
 
 #if AMRTEX_CPP || AMRTEX_SURFACE_POINTS > 0
-UNIFORM_ARRAY(real, u_surface_points, 5 * AMRTEX_SURFACE_POINTS, 80)  // see AMRTEX_COLOR_CURVE
+UNIFORM_ARRAY(real, u_surface_points, 5 * AMRTEX_SURFACE_POINTS, 160)  // see AMRTEX_COLOR_CURVE
 AMRTEX_COLOR_CURVE(mapped_color, u_surface_points, AMRTEX_SURFACE_POINTS)
 #endif
 

@@ -44,7 +44,7 @@ real transfer_axis(IN(real) value) { return curve_axis(value, AMRTEX_LOGARITHMIC
 
 #if AMRTEX_CPP || AMRTEX_EXTINCTION_POINTS > 0
 UNIFORM_ARRAY(real, u_extinction_points, 3 * AMRTEX_EXTINCTION_POINTS, 48)  // see AMRTEX_EXTINCTION_CURVE
-UNIFORM_ARRAY(real, u_color_points, 5 * AMRTEX_COLOR_POINTS, 80)            // see AMRTEX_COLOR_CURVE
+UNIFORM_ARRAY(real, u_color_points, 5 * AMRTEX_COLOR_POINTS, 160)           // see AMRTEX_COLOR_CURVE
 
 AMRTEX_EXTINCTION_CURVE(points_extinction, u_extinction_points, AMRTEX_EXTINCTION_POINTS)
 AMRTEX_COLOR_CURVE(points_color, u_color_points, AMRTEX_COLOR_POINTS)

@@ -598,6 +598,48 @@ TEST_F(CommandLine, RenderExplainsAPicturesErrorByCause) {
   expect_complaint(amrtex({"render", scene, "--explain-error", "--reference"}), 2, HasSubstr("--reference"));
 }
 
+TEST_F(CommandLine, RenderDrawsADataSetWithoutAScene) {
+  EXPECT_EQ(amrtex({"render", kData, "-o", at("a.png"), "--size", "48", "32", "--save-scene", at("s.json")}).exit_code, 0);
+  EXPECT_GT(big_endian(read_text(at("a.png")), 16), 48) << "the bar stands beside the picture";
+  EXPECT_EQ(big_endian(read_text(at("a.png")), 20), 32);
+  EXPECT_EQ(amrtex({"render", at("s.json"), "-o", at("again.npy")}).exit_code, 0);
+  EXPECT_EQ(amrtex({"render", kData, "-o", at("b.npy"), "--size", "48", "32"}).exit_code, 0);
+  EXPECT_EQ(read_text(at("again.npy")), read_text(at("b.npy"))) << "the saved scene is what was drawn";
+  const Picture picture = read_npy(at("b.npy"));
+  double most = 0;
+  for (int y = 0; y < picture.height; ++y)
+    for (int x = 0; x < picture.width; ++x) most = std::max(most, picture.pixel(x, y)[3]);
+  EXPECT_GT(most, 0.5) << "something is seen";
+  EXPECT_EQ(amrtex({"render", kData, "-o", at("c.exr"), "--size", "16", "16", "--mode", "mip"}).exit_code, 0);
+  EXPECT_EQ(
+      amrtex({"render", kData, "-o", at("d.png"), "--size", "16", "16", "--isovalue", "1.1,1.3", "--no-color-bar"}).exit_code, 0);
+  EXPECT_EQ(big_endian(read_text(at("d.png")), 16), 16);
+}
+
+TEST_F(CommandLine, RenderTakesTheCameraLinesOfOtherPrograms) {
+  EXPECT_EQ(amrtex({"render", kData, "--save-scene", at("s.json"), "--camera", "3", "0.5", "0.5", "0.5", "0.5", "0.5", "0", "0",
+                    "-1", "-fovy", "40"})
+                .exit_code,
+            0);
+  const Json view = Json::parse(read_text(at("s.json"))).at("views");
+  EXPECT_EQ(view.at("eye"), Json({3.0, 0.5, 0.5}));
+  EXPECT_EQ(view.at("fov_y"), 40);
+  EXPECT_EQ(view.at("up"), Json({0.0, 0.0, -1.0}));
+}
+
+TEST_F(CommandLine, RenderOfADataSetRefusesInOneLine) {
+  expect_complaint(amrtex({"render", kData, "-o", at("a.png"), "--colormap", "jet"}), 2, HasSubstr("colour map"));
+  expect_complaint(amrtex({"render", kData, "-o", at("a.png"), "--view", "top"}), 2, HasSubstr("corner"));
+  expect_complaint(amrtex({"render", kData, "-o", at("a.png"), "--range", "2", "1"}), 2, HasSubstr("--range"));
+  expect_complaint(amrtex({"render", kData, "-o", at("a.png"), "--mode", "dvt"}), 2, HasSubstr("dvr"));
+  expect_complaint(amrtex({"render", kData, "-o", at("a.png"), "--field", "rho"}), 2, HasSubstr("phi"));
+  const std::string scene = experiment_file(one_point());
+  expect_complaint(amrtex({"render", scene, "-o", at("a.png"), "--view", "+x"}), 2, HasSubstr("--view"));
+  expect_complaint(amrtex({"run", scene, "--out", at("r"), "--colormap", "gray"}), 2, HasSubstr("data set"));
+}
+
+TEST_F(CommandLine, InfoShowsAHistogram) { EXPECT_THAT(amrtex({"info", kData}).out, HasSubstr("share of the volume")); }
+
 TEST_F(CommandLine, RenderOfAValueHasOneChannelAndAColorBar) {
   const std::string scene = experiment_file(with(one_point(), "render", {{"mode", "projection"}, {"width", 32}, {"height", 64}}));
   EXPECT_EQ(amrtex({"render", scene, "-o", at("a.npy")}).exit_code, 0);

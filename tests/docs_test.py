@@ -2,6 +2,7 @@
 
   docs_test.py PROGRAM        PROGRAM: the built amrtex
 """
+import os
 import pathlib
 import re
 import subprocess
@@ -98,6 +99,48 @@ class Figures(unittest.TestCase):
 def shapes(figure):
     """A figure's lines; of embedded pictures the place alone, because compressed bytes differ between versions of zlib."""
     return re.sub(r'href="data:[^"]*"', "", figure.read_text(encoding="utf-8")).splitlines()
+
+
+def commands_of(page):
+    """Lines of the page's blocks of code that begin with `amrtex`."""
+    blocks = re.findall(r"^```\n(.*?)^```", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    return [line.split() for block in blocks for line in block.splitlines() if line.startswith("amrtex ")]
+
+
+def draws():
+    """Is there a GL context?"""
+    found = subprocess.run([PROGRAM, "doctor", "--json"], capture_output=True, text=True)
+    return '"egl"' in found.stdout and found.returncode == 0
+
+
+class Commands(unittest.TestCase):
+    def run_all(self, page):
+        commands = commands_of(ROOT / "docs" / page)
+        self.assertTrue(commands)
+        with tempfile.TemporaryDirectory() as folder:
+            for name in ("data", "experiments"):
+                os.symlink(ROOT / name, pathlib.Path(folder) / name)
+            os.mkdir(pathlib.Path(folder) / "out")
+            for command in commands:
+                few = ["--where", "encoding = kd_tree and storage = r8", "--set", "frames=1"] if command[1] == "run" else []
+                with self.subTest(command=" ".join(command)):
+                    ended = subprocess.run([PROGRAM, *command[1:], *few], cwd=folder, capture_output=True, text=True)
+                    self.assertEqual(ended.returncode, 0, ended.stderr)
+                    if command[1] == "run":
+                        self.assertIn("smallest: kd_tree", ended.stdout)
+                    written = [command[i + 1] for i, word in enumerate(command) if word in ("-o", "--save-scene")]
+                    for name in written:
+                        self.assertTrue((pathlib.Path(folder) / name).exists(), name)
+
+    def test_every_command_from_a_file_to_a_table_works(self):
+        if not draws():
+            self.skipTest("no GL context")
+        self.run_all("from_your_file.md")
+
+    def test_every_command_of_the_colour_maps_works(self):
+        if not draws():
+            self.skipTest("no GL context")
+        self.run_all("color_maps.md")
 
 
 class Numbers(unittest.TestCase):

@@ -292,7 +292,7 @@ TEST_F(PictureFile, PngOfLightAndValues) {
   PngOptions options;
   options.color_bar = true;
   options.logarithmic = true;
-  options.unit = "g/cm^2";
+  options.title = "rho (g/cm^2)";
   Picture values = gradient(1);
   values.values[1] = kNan;
   for (const Picture& picture : {gradient(4), gradient(1), values}) {

@@ -10,6 +10,7 @@
 #include "bench/cli/commands.hpp"
 #include "bench/measure/advise.hpp"
 #include "bench/records/record.hpp"
+#include "bench/settings/default_scene.hpp"
 #include "structures/mesh/quoted.hpp"
 #include "structures/mesh/whole_file.hpp"
 #include "structures/readers/mesh_io.hpp"
@@ -65,25 +66,13 @@ AmrHierarchy read_data(const Arguments& a) {
   }
 }
 
-/// The whole domain from a corner.
-Json default_view(const AmrHierarchy& mesh) {
-  const Vec3d at = (mesh.domain_lower() + mesh.domain_upper()) * 0.5;
-  const double radius = glm::length(mesh.domain_upper() - mesh.domain_lower()) / 2;
-  const double fov_y = 35;
-  const double distance = radius / std::sin(fov_y / 2 * 3.14159265358979323846 / 180) * 0.8;  // a box does not fill its sphere
-  const Vec3d eye = at + glm::normalize(Vec3d(0.75, 0.55, 0.4)) * distance;
-  return {{"eye", {eye.x, eye.y, eye.z}}, {"at", {at.x, at.y, at.z}}, {"fov_y", fov_y}};
-}
-
-/// Transparent below a tenth of the field's range, then denser up to 20 per domain edge; blue to white to red.
-Json default_transfer_function(const AmrHierarchy& mesh) {
+/// As `amrtex render` draws the data set.
+Json default_transfer_function(const AmrHierarchy& mesh, const SceneRequest& request) {
   const FieldStatistics& range = mesh.statistics(0);
   if (!(range.max > range.min))
     throw UsageError(fmt::format("{}: the field {} is {} everywhere; accepted: a field with a range, or --transfer-function",
                                  clipped(mesh.name()), clipped(mesh.fields().front()), range.min));
-  const auto value = [&](double share) { return range.min + share * (range.max - range.min); };
-  return {{"extinction", {{value(0.1), 0}, {value(1), 20}}},
-          {"color", {{value(0), 0.1, 0.2, 0.8}, {value(0.5), 0.9, 0.9, 0.9}, {value(1), 0.8, 0.1, 0.1}}}};
+  return to_json(default_transfer(mesh, request));
 }
 
 /// The scene as a file would say it, but for what is sought.
@@ -91,12 +80,15 @@ Json scene_json(const Arguments& a, const AmrHierarchy& mesh) {
   const std::string file = fs::absolute(a.data).lexically_normal().string();
   if (!is_utf8(file)) throw UsageError(fmt::format("{}: a path that is not UTF-8 cannot stand in a scene", clipped(file)));
   Json dataset = {{"file", file}, {"field", mesh.fields().front()}};
+  SceneRequest request;
+  request.width = a.width;
+  request.height = a.height;
   return {{"name", "advise"},
           {"datasets", Json::array({dataset})},
           {"encodings", Json::array({{{"name", all_encodings().front()->name()}}})},
           {"render", {{"mode", "dvr"}, {"sampling", "adaptive"}, {"width", a.width}, {"height", a.height}}},
-          {"views", a.view.empty() ? default_view(mesh) : read_json_argument(a.view, "--view")},
-          {"transfer_function", a.transfer_function.empty() ? default_transfer_function(mesh)
+          {"views", a.view.empty() ? to_json(default_view(mesh, request)) : read_json_argument(a.view, "--view")},
+          {"transfer_function", a.transfer_function.empty() ? default_transfer_function(mesh, request)
                                                             : read_json_argument(a.transfer_function, "--transfer-function")}};
 }
 
@@ -276,7 +268,7 @@ void add_advise_command(CLI::App& app, Command& chosen) {
       ->check(CLI::PositiveNumber);
   c->add_option("--reference", a->reference, "filter that pictures are held against; linear_vertex otherwise. own: each its own");
   c->add_option("--transfer-function", a->transfer_function,
-                "JSON file or the JSON itself (docs/experiments.md); a ramp over the field's range otherwise");
+                "JSON file or the JSON itself (docs/experiments.md); one that follows the field's histogram otherwise");
   c->add_option("--view", a->view, "JSON file or the JSON itself; the whole domain from a corner otherwise");
   c->add_option("--width", a->width, "pixels; 512 otherwise")->check(CLI::Range(1, 16384));
   c->add_option("--height", a->height, "pixels; 512 otherwise")->check(CLI::Range(1, 16384));

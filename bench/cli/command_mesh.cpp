@@ -4,6 +4,7 @@
 
 #include "bench/cli/commands.hpp"
 #include "bench/settings/json_file.hpp"
+#include "bench/settings/value_histogram.hpp"
 #include "structures/common/encoding.hpp"
 #include "structures/generators/synthetic.hpp"
 #include "structures/mesh/quoted.hpp"
@@ -46,6 +47,24 @@ Json info_json(const AmrHierarchy& mesh) {
   return json;
 }
 
+/// How the values are spread over the volume: of one field in full, of several a line each.
+void print_histograms(const AmrHierarchy& mesh) {
+  constexpr int kBins = 16, kLineBins = 48, kWidth = 78;
+  const bool one = mesh.fields().size() == 1;
+  fmt::print("\n  share of the volume by value; bars over its logarithm\n");
+  for (std::size_t f = 0; f < mesh.fields().size(); ++f) {
+    const auto field = static_cast<int>(f);
+    const ShownRange range = shown_range(mesh, field);
+    const ValueHistogram histogram =
+        value_histogram(mesh, field, range.lower, range.upper, range.logarithmic, one ? kBins : kLineBins);
+    if (one)
+      fmt::print("{}", histogram_text(histogram, kWidth));
+    else
+      fmt::print("  {:12} {:>10.4g} |{}| {:.4g}{}\n", printable(mesh.fields()[f]), range.lower, sparkline(histogram), range.upper,
+                 range.logarithmic ? "  (log)" : "");
+  }
+}
+
 void print_info(const AmrHierarchy& mesh) {
   const Json json = info_json(mesh);
   const Vec3d lower = mesh.domain_lower();
@@ -67,6 +86,7 @@ void print_info(const AmrHierarchy& mesh) {
     if (s.cells_without_value > 0)
       fmt::print("    {} leaf cells have no value (NaN or infinite); they are not drawn\n", s.cells_without_value);
   }
+  print_histograms(mesh);
   for (bool p : mesh.periodic())
     if (p) {
       fmt::print("\n  periodic domain: drawn clamped at its faces\n");

@@ -1,6 +1,12 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <exception>
+#include <limits>
 
 #include "bench/cli/commands.hpp"
+#include "bench/cli/render_arguments.hpp"
 #include "bench/measure/error_split.hpp"
 #include "bench/measure/scene_data.hpp"
 #include "bench/measure/value_resolution.hpp"
@@ -9,19 +15,27 @@
 #include "renderers/bindings/scene_needs.hpp"
 #include "renderers/consumers/make_consumer.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
+#include "renderers/scene/background.hpp"
+#include "renderers/scene/color_map.hpp"
+#include "renderers/scene/framing.hpp"
 #include "renderers/scene/scene_settings.hpp"
 #include "structures/mesh/quoted.hpp"
+#include "structures/mesh/whole_file.hpp"
 
 namespace amrtex {
 namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
-  std::string scene, output, context, memory_limit;
+struct Arguments : SceneArguments {
+  std::string input, output, context, memory_limit, save_scene;
   std::vector<std::string> set;
   bool reference = false;
   bool color_bar = false;
+  bool no_color_bar = false;
+  bool outline = false;
+  bool no_outline = false;
+  bool transparent = false;
   bool explain_error = false;
   bool prune = false;
   bool json = false;
@@ -29,18 +43,58 @@ struct Arguments {
   std::optional<double> tolerance;
 };
 
-void write_picture(const Arguments& a, const Picture& picture, const Experiment& scene, const AmrHierarchy& mesh) {
+/// What the bar beside a picture shows.
+std::vector<PngColor> bar_colors(const Scene& scene, const ColorPoints& map) {
+  std::vector<PngColor> colors;
+  const auto add = [&](const ColorPoints& points) {
+    for (const auto& p : points) colors.push_back({p.value, {p.rgb.x, p.rgb.y, p.rgb.z}});
+  };
+  const RenderSettings& s = scene.settings;
+  if (s.picture_channels() == 1)
+    add(map);
+  else if (s.draws_volume() || (s.draws_surfaces() && s.isosurfaces.output == Output::color))
+    add(s.draws_volume() ? scene.transfer_function.color : surface_colors(scene).color);
+  return colors;
+}
+
+std::string bar_title(const Scene& scene, const AmrHierarchy& mesh) {
+  const Isosurfaces& iso = scene.settings.isosurfaces;
+  if (scene.settings.draws_surfaces() && iso.output == Output::depth) return "distance";
+  if (scene.settings.mode == Mode::iso && !iso.color_field.empty()) return iso.color_field;
+  return mesh.fields().front() + (scene.settings.mode == Mode::projection ? " x length" : "");
+}
+
+/// Raw values of rays that pass the domain are none, rather than 0: what lies around it is background.
+Picture without_outside(const Picture& picture, const Scene& scene, const AmrHierarchy& mesh) {
+  if (picture.channels != 1 || scene.settings.mirror) return picture;
+  Picture inside = picture;
+  const CameraFrame camera = camera_frame(scene.view, picture.width, picture.height);
+  for (int y = 0; y < picture.height; ++y)
+    for (int x = 0; x < picture.width; ++x)
+      if (!meets_box(camera_ray(camera, x, y, picture.width, picture.height), mesh.domain_lower(), mesh.domain_upper()))
+        *inside.pixel(x, y) = std::numeric_limits<double>::quiet_NaN();
+  return inside;
+}
+
+void write_picture(const Arguments& a, const Picture& picture, const Scene& scene, const AmrHierarchy& mesh) {
   const fs::path path = a.output;
-  if (path.extension() == ".npy") {
-    write_npy(picture, path, a.reference);
-    return;
-  }
+  if (path.extension() == ".npy") return write_npy(picture, path, a.reference);
+  if (path.extension() == ".exr") return write_exr(picture, path);
   PngOptions options;
+  const Vec3d behind = background_for(scene);
+  options.background = {behind.x, behind.y, behind.z};
+  options.transparent = a.transparent;
   options.color_bar = a.color_bar;
-  options.logarithmic = scene.renders.front().transfer_function.logarithmic;
-  options.unit = mesh.fields().front();
-  if (scene.renders.front().settings.mode == Mode::projection) options.unit += " x length";
-  write_png(picture, path, options);
+  options.logarithmic =
+      scene.settings.picture_channels() == 1 && scene.settings.draws_surfaces() ? false : scene.transfer_function.logarithmic;
+  options.title = printable(bar_title(scene, mesh));
+  const bool named = std::find(color_map_names().begin(), color_map_names().end(), a.color_map) != color_map_names().end();
+  options.colors = bar_colors(scene, color_map(named ? std::string_view(a.color_map) : "viridis"));
+  if (a.outline)
+    for (const auto& [x0, y0, x1, y1] :
+         box_edges(mesh.domain_lower(), mesh.domain_upper(), scene.view, picture.width, picture.height))
+      options.lines.push_back({x0, y0, x1, y1});
+  write_png(without_outside(picture, scene, mesh), path, options);
 }
 
 /// An error asked for replaces the scene's step.
@@ -114,49 +168,153 @@ void explain_error(const Arguments& a, const SplitRequest& request) {
   fmt::print("{}\n", json.dump());
 }
 
-int run(const Arguments& a) {
-  if (a.output.empty() && !a.explain_error) throw UsageError("-o is missing: the picture to write, .png or .npy");
+void check_arguments(const Arguments& a) {
+  if (a.output.empty() && !a.explain_error && a.save_scene.empty())
+    throw UsageError("-o is missing: the picture to write, .png, .exr or .npy");
   if (a.reference && a.explain_error) throw UsageError("--explain-error: the reference has no error; leave out --reference");
   if (a.json && !a.explain_error) throw UsageError("--json: only with --explain-error, whose table it replaces");
   const std::string extension = fs::path(a.output).extension();
-  if (!a.output.empty() && extension != ".png" && extension != ".npy")
-    throw UsageError(fmt::format("-o {}: accepted: a name ending in .png (to look at) or .npy (floats to measure)", a.output));
-  const Experiment scene = read_scene(a.scene, {.set = a.set});
-  const BuildPoint& build = scene.builds.front();
-  const AmrHierarchy mesh = load_dataset(scene, scene.datasets[build.dataset]);
-  Scene drawn = with_tolerance(scene_of(scene, scene.renders.front()), a.tolerance);
-  drawn.settings.prune = drawn.settings.prune || a.prune;
-  const auto context = make_context(parse_context_kind(a.context.empty() ? scene.context : a.context));
+  if (!a.output.empty() && extension != ".png" && extension != ".exr" && extension != ".npy")
+    throw UsageError(
+        fmt::format("-o {}: accepted: a name ending in .png (to look at), .exr or .npy (floats to measure)", clipped(a.output)));
+  if (!a.save_scene.empty() && fs::path(a.save_scene).extension() != ".json")
+    throw UsageError(fmt::format("--save-scene {}: accepted: a name ending in .json", clipped(a.save_scene)));
+}
+
+/// A scene and the mesh that it draws.
+struct Drawn {
+  Experiment scene;
+  AmrHierarchy mesh;
+};
+
+std::vector<std::string> together(std::vector<std::string> first, const std::vector<std::string>& then) {
+  first.insert(first.end(), then.begin(), then.end());
+  return first;
+}
+
+Drawn read_scene_file(const Arguments& a) {
+  if (const std::vector<std::string> names = a.of_data_alone(); !names.empty())
+    throw UsageError(
+        fmt::format("{}: with a scene file, which holds its own view and transfer function; accepted: --set, or the "
+                    "data set itself in place of the scene",
+                    fmt::join(names, ", ")));
+  Experiment scene = read_scene(a.input, {.set = together(a.overrides(), a.set)});
+  AmrHierarchy mesh = load_dataset(scene, scene.datasets[scene.builds.front().dataset]);
+  return {std::move(scene), std::move(mesh)};
+}
+
+/// Does the mesh hold what the scene draws? `--set` may ask for other fields than were read.
+bool holds_fields(const AmrHierarchy& mesh, const Experiment& scene) {
+  const auto has = [&](const std::string& name) {
+    return name.empty() || std::find(mesh.fields().begin(), mesh.fields().end(), name) != mesh.fields().end();
+  };
+  const RenderPoint& render = scene.renders.front();
+  bool all = scene.datasets.front().field == mesh.fields().front() && has(render.settings.isosurfaces.color_field);
+  for (const FieldTransfer& other : render.more_fields) all = all && has(other.field);
+  return all;
+}
+
+Drawn describe_data(const Arguments& a) {
+  AmrHierarchy mesh = read_data_set(a.input, a.field);
+  const Json json = default_scene(mesh, a.request(a.input, mesh));
+  Experiment scene = parse_scene(json.dump(1), fs::path(a.input) / "default_scene", {.set = a.set});
+  if (!holds_fields(mesh, scene)) mesh = load_dataset(scene, scene.datasets.front());
+  return {std::move(scene), std::move(mesh)};
+}
+
+BuildRequest build_request(const Arguments& a, const Drawn& d, const Scene& drawn, Context& context) {
+  const BuildPoint& build = d.scene.builds.front();
   BuildRequest request;
   request.storage = build.storage;
   request.parameters = build.parameters;
-  request.context = context->info();
+  request.context = context.info();
   request.needs = scene_needs(drawn, build.filter, build.filtering);
-  request.more_fields = more_fields(mesh, drawn);
-  for (const std::string& warning : scene_warnings(mesh, drawn)) fmt::print(stderr, "warning: {}\n", printable(warning));
+  request.more_fields = more_fields(d.mesh, drawn);
   if (!a.memory_limit.empty())
     request.memory_limit = parse_bytes(a.memory_limit);
-  else if (scene.memory_limit)
-    request.memory_limit = *scene.memory_limit;
+  else if (d.scene.memory_limit)
+    request.memory_limit = *d.scene.memory_limit;
+  return request;
+}
+
+void draw(const Arguments& a, const Drawn& d, const Scene& drawn, Context& context) {
+  const BuildPoint& build = d.scene.builds.front();
+  const BuildRequest request = build_request(a, d, drawn, context);
   const Encoding& encoding = find_encoding(build.encoding);
   require_support(encoding, request.context);
-  EncodedField field = encoding.build(mesh, request);
+  EncodedField field = encoding.build(d.mesh, request);
   for (const std::string& warning : value_resolution(field, drawn).warnings()) fmt::print(stderr, "warning: {}\n", warning);
   if (a.reference) {
-    write_picture(a, HierarchyReference(mesh, 0, field.definition).render(drawn, reference_rule(a, scene)), scene, mesh);
-    return 0;
+    write_picture(a, HierarchyReference(d.mesh, 0, field.definition).render(drawn, reference_rule(a, d.scene)), drawn, d.mesh);
+    return;
   }
-  const Structure structure(*context, std::move(field), request);
-  const auto consumer = make_consumer(*context, mesh, structure, drawn);
+  const Structure structure(context, std::move(field), request);
+  const auto consumer = make_consumer(context, d.mesh, structure, drawn);
   consumer->draw();
   const Picture picture = consumer->read();
-  if (!a.output.empty()) write_picture(a, picture, scene, mesh);
+  if (!a.output.empty()) write_picture(a, picture, drawn, d.mesh);
   if (a.explain_error) {
-    const ReferenceRule rule = reference_rule(a, scene);
-    const Picture reference = HierarchyReference(mesh, 0, structure.field.definition).render(drawn, rule);
-    const auto truth = analytic_field(scene.datasets[build.dataset]);
-    explain_error(a, {mesh, encoding, structure, *context, drawn, reference, picture, rule, truth.get()});
+    const ReferenceRule rule = reference_rule(a, d.scene);
+    const Picture reference = HierarchyReference(d.mesh, 0, structure.field.definition).render(drawn, rule);
+    const auto truth = analytic_field(d.scene.datasets[build.dataset]);
+    explain_error(a, {d.mesh, encoding, structure, context, drawn, reference, picture, rule, truth.get()});
   }
+}
+
+/// What a data set is drawn by where nobody says: the first that holds it. All of them filter linearly.
+struct Choice {
+  const char* encoding;
+  Filter filter;
+};
+constexpr Choice kChoices[] = {{"kd_tree", Filter::linear_vertex}, {"exabricks", Filter::basis}, {"octree", Filter::linear_lod}};
+
+void draw_by_first(const Arguments& a, Drawn& d, const Scene& drawn, Context& context) {
+  std::exception_ptr first;
+  for (const Choice& choice : kChoices) {
+    BuildPoint& build = d.scene.builds.front();
+    if (first) {
+      build.encoding = choice.encoding;
+      build.filter = choice.filter;
+      build.parameters = Json::object();
+    }
+    try {
+      return draw(a, d, drawn, context);
+    } catch (const UnsupportedError&) {
+      if (!first) first = std::current_exception();
+    } catch (const BudgetError&) {
+      if (!first) first = std::current_exception();
+    }
+  }
+  std::rethrow_exception(first);
+}
+
+void save_scene(const Arguments& a, const Drawn& d) {
+  if (!a.save_scene.empty())
+    write_atomically(a.save_scene, point_experiment(d.scene, d.scene.builds.front(), d.scene.renders.front()).dump(1) + "\n");
+}
+
+/// What `--set` and options leave open, the program may choose.
+bool free_encoding(const Arguments& a, const Drawn& d) {
+  return a.encoding.empty() && a.filter.empty() && d.scene.builds.front().encoding == kChoices[0].encoding;
+}
+
+int run(Arguments a) {
+  check_arguments(a);
+  const bool data = is_data_set(a.input);
+  Drawn d = data ? describe_data(a) : read_scene_file(a);
+  a.outline = a.outline || (data && !a.no_outline);
+  a.color_bar = a.color_bar || (data && !a.no_color_bar);
+  if (!a.output.empty() || a.explain_error) {
+    Scene drawn = with_tolerance(scene_of(d.scene, d.scene.renders.front()), a.tolerance);
+    drawn.settings.prune = drawn.settings.prune || a.prune;
+    const auto context = make_context(parse_context_kind(a.context.empty() ? d.scene.context : a.context));
+    for (const std::string& warning : scene_warnings(d.mesh, drawn)) fmt::print(stderr, "warning: {}\n", printable(warning));
+    if (data && free_encoding(a, d))
+      draw_by_first(a, d, drawn, *context);
+    else
+      draw(a, d, drawn, *context);
+  }
+  save_scene(a, d);
   return 0;
 }
 
@@ -164,9 +322,19 @@ int run(const Arguments& a) {
 
 void add_render_command(CLI::App& app, Command& chosen) {
   auto a = std::make_shared<Arguments>();
-  CLI::App* c = app.add_subcommand("render", "one picture of a scene file");
-  c->add_option("scene", a->scene, "scene file: an experiment file without axes (docs/experiments.md)")->required();
-  c->add_option("-o,--out", a->output, "picture: .png to look at, .npy for the floats; may be left out with --explain-error");
+  CLI::App* c = app.add_subcommand("render", "one picture of a data set, or of a scene file");
+  c->add_option("input", a->input, "data set; or a scene file: an experiment file without axes (docs/experiments.md)")
+      ->required();
+  c->add_option("-o,--out", a->output,
+                "picture: .png to look at, .exr or .npy for the floats; may be left out with --explain-error or --save-scene");
+  add_scene_arguments(*c, *a);
+  c->add_option("--save-scene", a->save_scene, "scene file to write of what is drawn: `render` and `run` take it");
+  c->add_flag("--transparent", a->transparent, "the picture's own opacity in place of a background (.png)");
+  CLI::Option* bar =
+      c->add_flag("--color-bar", a->color_bar, "a bar with the colours' values; beside pictures of data sets anyway");
+  c->add_flag("--no-color-bar", a->no_color_bar, "the picture alone")->excludes(bar);
+  CLI::Option* outline = c->add_flag("--outline", a->outline, "the domain's edges behind the picture; of data sets anyway");
+  c->add_flag("--no-outline", a->no_outline, "without them")->excludes(outline);
   c->add_option("--context", a->context, "egl, egl_device or osmesa; overrides the scene's");
   c->add_option("--memory-limit", a->memory_limit, "for the structure, as 512MiB");
   add_set_option(*c, a->set);
@@ -178,8 +346,9 @@ void add_render_command(CLI::App& app, Command& chosen) {
   c->add_flag("--explain-error", a->explain_error, "print the picture's error by cause");
   c->add_flag("--json", a->json, "of --explain-error, for programs");
   c->add_flag("--prune", a->prune, "build nothing that the transfer function hides (mode dvr)");
-  c->add_flag("--color-bar", a->color_bar, "a bar with the range, for the modes projection and mip");
-  c->footer("Example: amrtex render experiments/limits/scene.json -o picture.png");
+  c->footer(
+      "Example: amrtex render data/amrex_tiny/plt00008 -o picture.png\n"
+      "         amrtex render experiments/limits/scene.json -o picture.png");
   c->callback([a, &chosen] { chosen = [a] { return run(*a); }; });
 }
 

@@ -8,6 +8,7 @@
 
 #include "bench/cli/commands.hpp"
 #include "bench/cli/interrupt_watch.hpp"
+#include "bench/cli/render_arguments.hpp"
 #include "bench/cli/run_arguments.hpp"
 #include "bench/cli/run_progress.hpp"
 #include "bench/measure/runner.hpp"
@@ -19,6 +20,7 @@
 #include "bench/report/repetitions.hpp"
 #include "bench/report/report.hpp"
 #include "bench/report/scatter.hpp"
+#include "bench/report/verdict.hpp"
 #include "bench/report/work_precision.hpp"
 #include "structures/mesh/quoted.hpp"
 #include "structures/mesh/whole_file.hpp"
@@ -29,6 +31,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Arguments : RunArguments {
+  SceneArguments scene;  ///< where the input is a data set
   std::string columns, where, process_limit;
   std::vector<std::string> only;
   std::optional<double> time_limit, time_out;
@@ -197,7 +200,9 @@ RunSummary measure(const Arguments& a, const Experiment& experiment, RunOptions 
   return run_experiment(experiment, options);
 }
 
-int run(const Arguments& a) {
+int run(Arguments a) {
+  const bool data = is_data_set(a.input);
+  a.input = a.scene.experiment_of(a.input, a.output);
   const Experiment experiment = a.experiment();
   check_paper_tables(experiment);
   RunOptions options = a.options();
@@ -216,7 +221,9 @@ int run(const Arguments& a) {
   print_warnings(s.warnings);
   for (const char* name : {"columns.json", "tables.json"}) copy_beside(experiment, a.output, name);
   const bool any = s.measured + s.kept + s.unsupported + s.over_budget + s.failed > 0;
-  print_summary(a, s, any ? write_report(a.output, "", load_records(a.output)) : std::vector<Table>());
+  const std::vector<Json> records = any ? load_records(a.output) : std::vector<Json>();
+  print_summary(a, s, any ? write_report(a.output, "", records) : std::vector<Table>());
+  if (data && !a.json) fmt::print("\n{}\n", verdict(one_a_point(records)));
   return s.failed > 0 ? 1 : 0;
 }
 
@@ -260,8 +267,9 @@ void add_set_option(CLI::App& command, std::vector<std::string>& set) {
 
 void add_run_commands(CLI::App& app, Command& chosen) {
   auto a = std::make_shared<Arguments>();
-  CLI::App* r = app.add_subcommand("run", "measure all points of an experiment; goes on where an earlier run stopped");
+  CLI::App* r = app.add_subcommand("run", "measure all points of an experiment, or the encodings of a data set; goes on where an earlier run stopped");
   add_run_arguments(*r, *a);
+  add_scene_arguments(*r, a->scene);
   CLI::Option* force = r->add_flag("--force", a->force, "measure again what has a record");
   r->add_flag("--keep-old", a->keep_old, "keep records that other shaders or builders made; they are measured again otherwise")
       ->excludes(force);
@@ -279,7 +287,9 @@ void add_run_commands(CLI::App& app, Command& chosen) {
   r->add_flag("--list-points", a->list_points, "say which points there are and what became of them, and end");
   r->add_flag("--dry-run", a->dry_run, "say how much there is to do, and end");
   r->add_flag("--json", a->json, "print counts for programs");
-  r->footer("Example: amrtex run experiments/quickstart/experiment.json --out out/quickstart");
+  r->footer(
+      "Example: amrtex run experiments/quickstart/experiment.json --out out/quickstart\n"
+      "         amrtex run data/amrex_tiny/plt00008 --out out/tiny");
   r->callback([a, &chosen] { chosen = [a] { return run(*a); }; });
 
   CLI::App* p = app.add_subcommand("report", "tables (Markdown, CSV, LaTeX) from the records of a folder");

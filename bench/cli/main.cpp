@@ -2,8 +2,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <new>
+#include <string>
+#include <vector>
 
 #include "bench/cli/commands.hpp"
 #include "structures/mesh/error.hpp"
@@ -54,6 +57,7 @@ void amrtex::print_warnings(const std::vector<std::string>& warnings) {
 
 int main(int argc, char** argv) {
   CLI::App app{"amrtex: GPU encodings of AMR data, compared by memory, frame time and image error"};
+  app.name("amrtex");
   app.require_subcommand(1);
   app.set_version_flag("--version", "amrtex 0.1.0");
   app.footer("Example: amrtex run experiments/quickstart/experiment.json --out out/quickstart");
@@ -70,8 +74,12 @@ int main(int argc, char** argv) {
   amrtex::add_verify_command(app, chosen);
   amrtex::add_advise_command(app, chosen);
   amrtex::add_settings_command(app, chosen);
+  std::vector<std::string> words(argv + 1, argv + argc);
+  for (std::string& word : words)
+    if (word == "-fovy" || word == "-fov") word = "--fovy";  // as the camera lines of other programs have it
+  std::reverse(words.begin(), words.end());                  // the parser takes the last one first
   try {
-    app.parse(argc, argv);
+    app.parse(std::move(words));
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
     print_error(complaint(app, error));

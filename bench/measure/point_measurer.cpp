@@ -210,7 +210,7 @@ void PointMeasurer::add_warnings(Json& record, const Scene& scene, const Consume
   if (scene.settings.slice_target == SliceTarget::rgba8)
     warn(record, "slices were blended in 8 bits a channel (slice_target rgba8): a historical control");
   if (!consumer.transfer_exact())
-    warn(record, "the transfer function has more than 16 points: it is drawn from a table of 4096 bins");
+    warn(record, "the transfer function has more than 16 points of extinction or 32 of colour: it is drawn from a table of 4096 bins");
 }
 
 void PointMeasurer::add_times(Json& record, const RenderPoint& render, Consumer& consumer) {

@@ -38,9 +38,9 @@ void add_surface_map(const Scene& scene, const EncodedField& field, SceneBinding
   if (mapped && field.field_count < 2)
     throw Error(fmt::format("surfaces coloured by the field {}: the structure was built without it", quote(iso.color_field)));
   if (mapped) map = in_units(map, field.scale_of(1).units);
-  if (map.color.size() > kMostExactPoints)
+  if (map.color.size() > kMostExactColors)
     throw UsageError(fmt::format("surfaces coloured by the field {}: {} colour points; at most {} are supported",
-                                 quote(iso.color_field), map.color.size(), kMostExactPoints));
+                                 quote(iso.color_field), map.color.size(), kMostExactColors));
   if (mapped) b.set("u_surface_points", color_points(map));
   b.define("AMRTEX_SURFACE_POINTS", mapped ? static_cast<int>(map.color.size()) : 0);
   b.define("AMRTEX_SURFACE_LOGARITHMIC", mapped && map.logarithmic ? 1 : 0);

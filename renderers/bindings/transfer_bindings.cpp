@@ -19,7 +19,9 @@ constexpr std::size_t kMostKnots = 34;
 constexpr double kMostExtinction = 1e30;
 
 /// Is the transfer function evaluated from its points, or from a table?
-bool is_exact(const TransferFunction& tf) { return std::max(tf.extinction.size(), tf.color.size()) <= kMostExactPoints; }
+bool is_exact(const TransferFunction& tf) {
+  return tf.extinction.size() <= kMostExactPoints && tf.color.size() <= kMostExactColors;
+}
 
 /// A float, or the largest one.
 double as_float(double v) {

@@ -27,11 +27,13 @@ std::string clip_plane_problem(const Scene& scene) {
 std::string fields_problem(const Scene& scene) {
   if (scene.more_fields.empty()) return "";
   const auto too_long = [](const TransferFunction& tf, std::string_view field) -> std::string {
-    for (const auto& [curve, points] : {std::pair("extinction", tf.extinction.size()), std::pair("color", tf.color.size())})
-      if (points > kMostExactPoints)
-        return fmt::format("'{}' of {} has {} points; with several fields at most {} are supported", curve, clipped(field),
-                           points, kMostExactPoints);
-    return "";
+    const auto refuse = [&](const char* curve, std::size_t points, std::size_t most) {
+      return points > most ? fmt::format("'{}' of {} has {} points; with several fields at most {} are supported", curve,
+                                         clipped(field), points, most)
+                           : std::string();
+    };
+    const std::string extinction = refuse("extinction", tf.extinction.size(), kMostExactPoints);
+    return extinction.empty() ? refuse("color", tf.color.size(), kMostExactColors) : extinction;
   };
   std::string problem = too_long(scene.transfer_function, "the first field");
   for (const FieldTransfer& f : scene.more_fields) {

@@ -39,11 +39,30 @@ std::string picture_hash(const Picture& picture);
 void write_npy(const Picture& picture, const std::filesystem::path& path, bool as_double);
 Picture read_npy(const std::filesystem::path& path);
 
+/// 32-bit floats, no compression that loses any: channels R, G, B and A, premultiplied, or Y. Throws Error with the path.
+void write_exr(const Picture& picture, const std::filesystem::path& path);
+
+/// A colour of a bar; linear RGB.
+struct PngColor {
+  double value;
+  std::array<double, 3> rgb;
+};
+
+/// A line of the picture's background, pixels from its upper left corner.
+struct PngLine {
+  double x0, y0, x1, y1;
+};
+
 struct PngOptions {
   std::array<double, 3> background{0, 0, 0};  ///< linear RGB behind premultiplied colour
-  bool color_bar = false;                     ///< one-channel pictures: a bar with minimum, maximum and unit
-  bool logarithmic = false;                   ///< one-channel pictures: colours over log10(value)
-  std::string unit;                           ///< printed beside the bar
+  bool transparent = false;                   ///< the picture's own alpha in its place
+  bool color_bar = false;                     ///< a bar with ticks beside the picture, where there is something to show in it
+  bool logarithmic = false;                   ///< colours are joined over log10(value)
+  std::string title;                          ///< above the bar
+  /// Four channels: what the bar shows, over values. One channel: a map over 0 to 1, which is laid over the picture's range;
+  /// empty: viridis.
+  std::vector<PngColor> colors;
+  std::vector<PngLine> lines;  ///< behind four-channel pictures with a background, a faint colour that it sets off
 };
 /// 8-bit sRGB to look at; one-channel pictures through a colour map over their range.
 void write_png(const Picture& picture, const std::filesystem::path& path, const PngOptions& options = {});

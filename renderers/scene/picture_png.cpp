@@ -4,150 +4,241 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <optional>
 #include <string_view>
+#include <utility>
 
+#include "renderers/scene/color_map.hpp"
+#include "renderers/scene/dot_font.hpp"
 #include "renderers/scene/picture.hpp"
+#include "renderers/scene/ticks.hpp"
 #include "structures/mesh/error.hpp"
 #include "structures/mesh/whole_file.hpp"
 
 namespace amrtex {
 namespace {
 
-using Rgb = std::array<double, 3>;  // sRGB, 0 to 1
+using Rgb = std::array<double, 3>;
 
-constexpr int kBarWidth = 16;  // pixels
-constexpr int kBarMargin = 8;  // pixels
-constexpr int kGlyphWidth = 3, kGlyphHeight = 5, kGlyphScale = 2;
-constexpr int kAdvance = (kGlyphWidth + 1) * kGlyphScale;
+constexpr int kGlyphGap = 1;  // dots between letters
 
 /// An 8-bit picture that is drawn into.
 struct Canvas {
   int width, height;
-  std::vector<std::uint8_t> bytes;  // RGB
+  std::vector<std::uint8_t> bytes;  // RGBA, sRGB
 
-  Canvas(int w, int h) : width(w), height(h), bytes(static_cast<std::size_t>(w) * static_cast<std::size_t>(h) * 3) {}
-  void set(int x, int y, const Rgb& color) {
+  Canvas(int w, int h) : width(w), height(h), bytes(static_cast<std::size_t>(w) * static_cast<std::size_t>(h) * 4) {}
+  void set(int x, int y, const Rgb& srgb, double alpha = 1) {
     if (x < 0 || y < 0 || x >= width || y >= height) return;
-    const std::size_t i = (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)) * 3;
-    for (std::size_t c = 0; c < 3; ++c)
-      bytes[i + c] = static_cast<std::uint8_t>(std::lround(255 * std::clamp(color[c], 0.0, 1.0)));
+    const std::size_t i = (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)) * 4;
+    for (std::size_t c = 0; c < 3; ++c) bytes[i + c] = byte(srgb[c]);
+    bytes[i + 3] = byte(alpha);
   }
+  void fill(int left, int top, int w, int h, const Rgb& srgb) {
+    for (int y = top; y < top + h; ++y)
+      for (int x = left; x < left + w; ++x) set(x, y, srgb);
+  }
+
+ private:
+  static std::uint8_t byte(double v) { return static_cast<std::uint8_t>(std::lround(255 * std::clamp(v, 0.0, 1.0))); }
 };
 
-double srgb(double linear) {
-  if (!(linear > 0)) return 0;
-  return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
+Rgb display(const Rgb& linear) { return {srgb_from_linear(linear[0]), srgb_from_linear(linear[1]), srgb_from_linear(linear[2])}; }
+
+/// Colours over an axis, linear between them.
+class Scale {
+ public:
+  Scale(std::vector<PngColor> colors, bool logarithmic) : colors_(std::move(colors)), logarithmic_(logarithmic) {}
+  bool empty() const { return colors_.size() < 2 || !(first() < last()); }
+  double first() const { return colors_.front().value; }
+  double last() const { return colors_.back().value; }
+  bool logarithmic() const { return logarithmic_; }
+  /// 0 at the first value, 1 at the last one.
+  double place(double value) const { return (axis(value) - axis(first())) / (axis(last()) - axis(first())); }
+  Rgb at_place(double place) const {
+    const double x = axis(first()) + place * (axis(last()) - axis(first()));
+    std::size_t k = 1;
+    while (k + 1 < colors_.size() && x >= axis(colors_[k].value)) ++k;
+    const double a = axis(colors_[k - 1].value), b = axis(colors_[k].value);
+    const double w = std::clamp((x - a) / (b - a), 0.0, 1.0);
+    Rgb linear{};
+    for (std::size_t c = 0; c < 3; ++c) linear[c] = colors_[k - 1].rgb[c] + w * (colors_[k].rgb[c] - colors_[k - 1].rgb[c]);
+    return display(linear);
+  }
+
+ private:
+  double axis(double v) const { return logarithmic_ ? std::log10(v) : v / 2; }  // half: the extent of all doubles is one
+
+  std::vector<PngColor> colors_;
+  bool logarithmic_;
+};
+
+Scale unit_scale(const PngOptions& options) {
+  std::vector<PngColor> colors = options.colors;
+  if (colors.empty())
+    for (const auto& p : color_map("viridis")) colors.push_back({p.value, {p.rgb.x, p.rgb.y, p.rgb.z}});
+  return {std::move(colors), false};
 }
 
-/// Nine points along matplotlib's "viridis" (CC0): even steps look even, also without colour.
-Rgb color_map(double x) {
-  constexpr std::array<Rgb, 9> kPoints{{{0.267, 0.005, 0.329},
-                                        {0.279, 0.175, 0.483},
-                                        {0.230, 0.322, 0.546},
-                                        {0.173, 0.449, 0.558},
-                                        {0.128, 0.567, 0.551},
-                                        {0.158, 0.684, 0.502},
-                                        {0.369, 0.789, 0.383},
-                                        {0.678, 0.864, 0.190},
-                                        {0.993, 0.906, 0.144}}};
-  const double at = std::clamp(x, 0.0, 1.0) * (kPoints.size() - 1);
-  const std::size_t k = std::min(static_cast<std::size_t>(at), kPoints.size() - 2);
-  const double w = at - static_cast<double>(k);
-  Rgb color{};
-  for (std::size_t c = 0; c < 3; ++c) color[c] = kPoints[k][c] + w * (kPoints[k + 1][c] - kPoints[k][c]);
-  return color;
+/// Sizes in pixels; larger beside larger pictures.
+struct BarLayout {
+  int dot, bar, gap, tick;
+  explicit BarLayout(int height) : dot(std::clamp((height + 320) / 384, 1, 8)), bar(10 * dot), gap(5 * dot), tick(3 * dot) {}
+  int text_height() const { return kDotRows * dot; }
+  int text_width(std::size_t letters) const { return static_cast<int>(letters) * (kDotColumns + kGlyphGap) * dot; }
+};
+
+void draw_text(Canvas& canvas, int x, int y, int dot, std::string_view text, const Rgb& ink) {
+  for (const char ch : text) {
+    const auto columns = dot_glyph(ch);
+    for (int column = 0; column < kDotColumns; ++column)
+      for (int row = 0; row < kDotRows; ++row)
+        if (((columns[static_cast<std::size_t>(column)] >> row) & 1) != 0)
+          canvas.fill(x + column * dot, y + row * dot, dot, dot, ink);
+    x += (kDotColumns + kGlyphGap) * dot;
+  }
 }
 
-/// Rows of three bits from the top, as octal digits; letters are drawn as capitals.
-int glyph(char ch) {
-  constexpr std::string_view kChars = "0123456789-+./^ABCDEFGHIJKLMNOPQRSTUVWXYZ";
-  constexpr std::array<int, 41> kRows{075557, 026227, 071747, 071717, 055711, 074717, 074757, 071111, 075757, 075717, 000700,
-                                      002720, 000002, 011244, 025000, 025755, 065656, 034443, 065556, 074647, 074644, 034553,
-                                      055755, 072227, 011152, 055655, 044447, 057755, 065555, 025552, 065644, 025573, 065655,
-                                      034216, 072222, 055557, 055552, 055775, 055255, 055222, 071247};
-  static_assert(kChars.size() == kRows.size());
-  const char upper = ch >= 'a' && ch <= 'z' ? static_cast<char>(ch - 'a' + 'A') : ch;
-  const auto at = kChars.find(upper);
-  return at == std::string_view::npos ? 0 : kRows[at];
+/// The bar right of a picture: its title above, ticks and numbers at its right.
+class Bar {
+ public:
+  Bar(Scale scale, std::string title, int height)
+      : scale_(std::move(scale)), title_(std::move(title)), layout_(height), height_(height) {
+    if (scale_.empty()) return;
+    const int room = std::max(0, bottom() - top());
+    ticks_ = ticks(scale_.first(), scale_.last(), scale_.logarithmic(), std::clamp(room / (4 * layout_.text_height()), 2, 8));
+  }
+  int width() const {
+    if (scale_.empty()) return 0;
+    std::size_t letters = 0;
+    for (const Tick& t : ticks_) letters = std::max(letters, t.text.size());
+    const int beside = layout_.bar + 2 * layout_.tick + layout_.text_width(letters);
+    return 2 * layout_.gap + std::max(beside, layout_.text_width(title_.size()));
+  }
+  void draw(Canvas& canvas, int left, const Rgb& ink) const {
+    if (scale_.empty()) return;
+    const int x = left + layout_.gap;
+    draw_text(canvas, x, layout_.gap, layout_.dot, title_, ink);
+    const int rows = std::max(1, bottom() - top() - 1);
+    for (int y = top(); y < bottom(); ++y)
+      canvas.fill(x, y, layout_.bar, 1, scale_.at_place(static_cast<double>(bottom() - 1 - y) / rows));
+    const int line = std::max(1, layout_.dot / 2);
+    for (const Tick& t : ticks_) {
+      const int y = bottom() - 1 - static_cast<int>(std::lround(scale_.place(t.value) * rows));
+      canvas.fill(x + layout_.bar, y - line / 2, layout_.tick, line, ink);
+      draw_text(canvas, x + layout_.bar + 2 * layout_.tick, y - layout_.text_height() / 2, layout_.dot, t.text, ink);
+    }
+  }
+
+ private:
+  int top() const {
+    return title_.empty() ? layout_.gap + layout_.text_height() / 2 : 2 * layout_.gap + 3 * layout_.text_height() / 2;
+  }
+  int bottom() const { return height_ - layout_.gap - layout_.text_height() / 2; }
+
+  Scale scale_;
+  std::string title_;
+  BarLayout layout_;
+  int height_;
+  std::vector<Tick> ticks_;
+};
+
+Rgb ink_on(const Rgb& background, bool transparent) {
+  if (transparent) return {0.5, 0.5, 0.5};  // is read on white and on black
+  return lightness(Vec3d(background[0], background[1], background[2])) < 50 ? Rgb{1, 1, 1} : Rgb{0, 0, 0};
 }
 
-void draw_text(Canvas& canvas, int x, int y, std::string_view text, const Rgb& color) {
-  for (std::size_t k = 0; k < text.size(); ++k)
-    for (int row = 0; row < kGlyphHeight * kGlyphScale; ++row)
-      for (int column = 0; column < kGlyphWidth * kGlyphScale; ++column) {
-        const int bit = (kGlyphHeight - 1 - row / kGlyphScale) * kGlyphWidth + kGlyphWidth - 1 - column / kGlyphScale;
-        if (((glyph(text[k]) >> bit) & 1) != 0) canvas.set(x + static_cast<int>(k) * kAdvance + column, y + row, color);
+Canvas with_bar(const Picture& picture, const Bar& bar, const PngOptions& options) {
+  Canvas canvas(picture.width + (options.color_bar ? bar.width() : 0), picture.height);
+  if (!options.transparent) canvas.fill(0, 0, canvas.width, canvas.height, display(options.background));
+  if (options.color_bar) bar.draw(canvas, picture.width, ink_on(options.background, options.transparent));
+  return canvas;
+}
+
+/// How much of each pixel the lines cover.
+std::vector<double> coverage(const Picture& picture, const std::vector<PngLine>& lines) {
+  std::vector<double> covered(static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height));
+  const double half = std::max(0.5, picture.height / 1500.0);  // of the line's width
+  for (const PngLine& line : lines) {
+    const double dx = line.x1 - line.x0, dy = line.y1 - line.y0;
+    const double length = std::hypot(dx, dy);
+    if (!(length > 0) || !std::isfinite(length)) continue;
+    const auto first = [&](double a, double b) { return static_cast<int>(std::max(0.0, std::floor(std::min(a, b) - 2 * half))); };
+    const auto last = [&](double a, double b, int most) {
+      return static_cast<int>(std::clamp(std::ceil(std::max(a, b) + 2 * half), 0.0, static_cast<double>(most)));
+    };
+    for (int y = first(line.y0, line.y1); y < last(line.y0, line.y1, picture.height); ++y)
+      for (int x = first(line.x0, line.x1); x < last(line.x0, line.x1, picture.width); ++x) {
+        const double px = x + 0.5 - line.x0, py = y + 0.5 - line.y0;
+        const double along = std::clamp((px * dx + py * dy) / length, 0.0, length);
+        const double away = std::hypot(px - along * dx / length, py - along * dy / length);
+        double& c = covered[static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.width) + static_cast<std::size_t>(x)];
+        c = std::max(c, std::clamp(half + 0.5 - away, 0.0, 1.0));
       }
-}
-
-struct Range {
-  double min = std::numeric_limits<double>::infinity();
-  double max = -std::numeric_limits<double>::infinity();
-  bool logarithmic;
-
-  Range(const Picture& picture, bool log) : logarithmic(log) {
-    for (const double v : picture.values)
-      if (std::isfinite(v) && (!log || v > 0)) {
-        min = std::min(min, v);
-        max = std::max(max, v);
-      }
   }
-  bool empty() const { return !(min <= max); }
-  double axis(double v) const { return logarithmic ? std::log10(v) : v; }
-  /// Place of a value between 0 and 1; NaN where it has none.
-  double place(double v) const {
-    if (!std::isfinite(v) || (logarithmic && v <= 0)) return std::numeric_limits<double>::quiet_NaN();
-    return max > min ? (axis(v) - axis(min)) / (axis(max) - axis(min)) : 0.5;
-  }
-};
-
-struct BarText {
-  std::string max, min, unit;
-  int width() const { return static_cast<int>(std::max({max.size(), min.size(), unit.size()})) * kAdvance; }
-};
-
-void draw_bar(Canvas& canvas, int left, const BarText& text, const Rgb& ink) {
-  const int top = kBarMargin;
-  const int bottom = canvas.height - kBarMargin;
-  for (int y = top; y < bottom; ++y)
-    for (int x = 0; x < kBarWidth; ++x)
-      canvas.set(left + kBarMargin + x, y, color_map(static_cast<double>(bottom - 1 - y) / std::max(1, bottom - 1 - top)));
-  const int column = left + 2 * kBarMargin + kBarWidth;
-  draw_text(canvas, column, top, text.max, ink);
-  draw_text(canvas, column, (top + bottom - kGlyphHeight * kGlyphScale) / 2, text.unit, ink);
-  draw_text(canvas, column, bottom - kGlyphHeight * kGlyphScale, text.min, ink);
+  return covered;
 }
-
-Rgb display(const Rgb& linear) { return {srgb(linear[0]), srgb(linear[1]), srgb(linear[2])}; }
 
 Canvas draw_light(const Picture& picture, const PngOptions& options) {
-  Canvas canvas(picture.width, picture.height);
+  Canvas canvas = with_bar(picture, Bar({options.colors, options.logarithmic}, options.title, picture.height), options);
+  const std::vector<double> covered = coverage(picture, options.transparent ? std::vector<PngLine>() : options.lines);
+  const double line = srgb_from_linear(options.background[1]) < 0.5 ? linear_from_srgb(0.36) : linear_from_srgb(0.72);
   for (int y = 0; y < picture.height; ++y)
     for (int x = 0; x < picture.width; ++x) {
       const double* p = picture.pixel(x, y);
+      const double c_line =
+          covered[static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.width) + static_cast<std::size_t>(x)];
       Rgb linear{};
-      for (std::size_t c = 0; c < 3; ++c) linear[c] = p[c] + (1 - p[3]) * options.background[c];
-      canvas.set(x, y, display(linear));
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double behind = options.background[c] + c_line * (line - options.background[c]);
+        linear[c] = options.transparent ? (p[3] > 0 ? p[c] / p[3] : 0) : p[c] + (1 - p[3]) * behind;
+      }
+      canvas.set(x, y, display(linear), options.transparent ? p[3] : 1);
     }
   return canvas;
 }
 
+/// Of the values that have a place on the axis; empty where there are none.
+std::optional<std::array<double, 2>> range_of(const Picture& picture, bool logarithmic) {
+  std::optional<std::array<double, 2>> range;
+  for (const double v : picture.values) {
+    if (!std::isfinite(v) || (logarithmic && !(v > 0))) continue;
+    if (!range) range = {v, v};
+    (*range)[0] = std::min((*range)[0], v);
+    (*range)[1] = std::max((*range)[1], v);
+  }
+  return range;
+}
+
 Canvas draw_values(const Picture& picture, const PngOptions& options) {
-  const Range range(picture, options.logarithmic);
-  const bool bar = options.color_bar && !range.empty();
-  const BarText text =
-      bar ? BarText{fmt::format("{:.4g}", range.max), fmt::format("{:.4g}", range.min), options.unit} : BarText{};
-  Canvas canvas(picture.width + (bar ? 3 * kBarMargin + kBarWidth + text.width() : 0), picture.height);
-  const Rgb behind = display(options.background);
-  for (int y = 0; y < canvas.height; ++y)
-    for (int x = 0; x < canvas.width; ++x) {
-      const double place = x < picture.width ? range.place(*picture.pixel(x, y)) : std::numeric_limits<double>::quiet_NaN();
-      canvas.set(x, y, std::isnan(place) ? behind : color_map(place));
+  const Scale map = unit_scale(options);
+  const auto range = range_of(picture, options.logarithmic);
+  std::vector<PngColor> over_range;
+  if (range && (*range)[0] < (*range)[1])
+    for (int i = 0; i <= 64; ++i) {
+      const double w = i / 64.0;
+      const auto [low, high] = *range;
+      const double value = options.logarithmic ? low * std::pow(high / low, w) : (1 - w) * low + w * high;
+      const Rgb c = map.at_place(w);
+      over_range.push_back({value, {linear_from_srgb(c[0]), linear_from_srgb(c[1]), linear_from_srgb(c[2])}});
     }
-  const double ink = behind[0] + behind[1] + behind[2] < 1.5 ? 1 : 0;
-  if (bar) draw_bar(canvas, picture.width, text, {ink, ink, ink});
+  const Scale scale(over_range, options.logarithmic);
+  Canvas canvas = with_bar(picture, Bar(scale, options.title, picture.height), options);
+  for (int y = 0; y < picture.height; ++y)
+    for (int x = 0; x < picture.width; ++x) {
+      const double v = *picture.pixel(x, y);
+      if (!std::isfinite(v) || (options.logarithmic && !(v > 0))) continue;
+      canvas.set(x, y, map.at_place(scale.empty() ? 0.5 : scale.place(v)));
+    }
   return canvas;
+}
+
+std::vector<std::uint8_t> without_alpha(const std::vector<std::uint8_t>& rgba) {
+  std::vector<std::uint8_t> rgb;
+  rgb.reserve(rgba.size() / 4 * 3);
+  for (std::size_t i = 0; i < rgba.size(); i += 4)
+    rgb.insert(rgb.end(), rgba.begin() + static_cast<std::ptrdiff_t>(i), rgba.begin() + static_cast<std::ptrdiff_t>(i) + 3);
+  return rgb;
 }
 
 }  // namespace
@@ -161,10 +252,11 @@ void write_png(const Picture& picture, const std::filesystem::path& path, const 
   image.version = PNG_IMAGE_VERSION;
   image.width = static_cast<png_uint_32>(canvas.width);
   image.height = static_cast<png_uint_32>(canvas.height);
-  image.format = PNG_FORMAT_RGB;
+  image.format = options.transparent ? PNG_FORMAT_RGBA : PNG_FORMAT_RGB;
+  const std::vector<std::uint8_t> bytes_of_image = options.transparent ? canvas.bytes : without_alpha(canvas.bytes);
   png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
   std::string bytes(size, '\0');
-  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, canvas.bytes.data(), 0, nullptr) == 0)
+  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, bytes_of_image.data(), 0, nullptr) == 0)
     throw Error(fmt::format("{}: cannot be written: {}", path.string(), static_cast<const char*>(image.message)));
   bytes.resize(size);
   write_atomically(path, bytes);

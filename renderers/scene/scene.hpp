@@ -229,7 +229,8 @@ void require_resolved(const DomainGeometry& geometry, const Scene& scene);
 
 /// Points of each curve of a transfer function that shaders evaluate as they are. More make a table, and are refused with several
 /// fields.
-inline constexpr std::size_t kMostExactPoints = 16;
+inline constexpr std::size_t kMostExactPoints = 16;  ///< of extinction
+inline constexpr std::size_t kMostExactColors = 32;  ///< of colour: named maps take up to 26
 
 /// Colours of surfaces: their own, or the transfer function's, or else one grey.
 TransferFunction surface_colors(const Scene& scene);
