@@ -6,7 +6,6 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
-#include <optional>
 
 #include "structures/mesh/quoted.hpp"
 #include "structures/readers/enzo/enzo_text.hpp"
