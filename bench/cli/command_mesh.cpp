@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "bench/cli/commands.hpp"
@@ -47,6 +48,13 @@ Json info_json(const AmrHierarchy& mesh) {
   return json;
 }
 
+/// Of the longest name of a field, in columns.
+std::size_t name_width(const AmrHierarchy& mesh) {
+  std::size_t width = 12;
+  for (const std::string& name : mesh.fields()) width = std::max(width, printable(name).size());
+  return std::min(width, std::size_t{32});
+}
+
 /// How the values are spread over the volume: of one field in full, of several a line each.
 void print_histograms(const AmrHierarchy& mesh) {
   constexpr int kBins = 16, kLineBins = 48, kWidth = 78;
@@ -60,8 +68,8 @@ void print_histograms(const AmrHierarchy& mesh) {
     if (one)
       fmt::print("{}", histogram_text(histogram, kWidth));
     else
-      fmt::print("  {:12} {:>10.4g} |{}| {:.4g}{}\n", printable(mesh.fields()[f]), range.lower, sparkline(histogram), range.upper,
-                 range.logarithmic ? "  (log)" : "");
+      fmt::print("  {:{}} {:>10.4g} |{}| {:.4g}{}\n", printable(mesh.fields()[f]), name_width(mesh), range.lower,
+                 sparkline(histogram), range.upper, range.logarithmic ? "  (log)" : "");
   }
 }
 
@@ -79,10 +87,11 @@ void print_info(const AmrHierarchy& mesh) {
   for (int l = 0; l < mesh.level_count(); ++l)
     fmt::print("  {:5}  {:7}  {:10}  {:10}  {}\n", l, mesh.patches(l).size(), mesh.stored_cells(l), mesh.leaf_cells(l),
                l == mesh.finest_level() ? "-" : std::to_string(mesh.ratio_to_finer(l)));
-  fmt::print("\n  field                min            max  volume integral\n");
+  const std::size_t width = name_width(mesh);
+  fmt::print("\n  {:{}} {:>12} {:>14} {:>16}\n", "field", width, "min", "max", "volume integral");
   for (std::size_t f = 0; f < mesh.fields().size(); ++f) {
     const FieldStatistics& s = mesh.statistics(static_cast<int>(f));
-    fmt::print("  {:12} {:12.6g} {:14.6g} {:16.9g}\n", printable(mesh.fields()[f]), s.min, s.max, s.volume_integral);
+    fmt::print("  {:{}} {:12.6g} {:14.6g} {:16.9g}\n", printable(mesh.fields()[f]), width, s.min, s.max, s.volume_integral);
     if (s.cells_without_value > 0)
       fmt::print("    {} leaf cells have no value (NaN or infinite); they are not drawn\n", s.cells_without_value);
   }
