@@ -191,8 +191,9 @@ def report(programs, results, a):
     points = results[0]["points"]
     one = sum(r["one_line"] == "slower" or r["one_points"] > 0 for r in results)
     everything = sum("slower" in r["all_baseline"] for r in results)
-    text = ["# Comparisons of runs", "", "Made by `scripts/check_comparisons.py`: small pictures, " + f"{points} points, {n} trials, all programs "
-            "measured in turns.", "", "| what | expected | found |", "|---|---|---|"]
+    conditions = experiment_runs.conditions(experiment_runs.read_records(WORK / "trial_0" / "plain")[0])
+    text = ["# Comparisons of runs", "", f"Made by `scripts/check_comparisons.py`: 96 x 96, {points} points, {n} trials, all programs measured in "
+            f"turns, {conditions}.", "", "| what | expected | found |", "|---|---|---|"]
     for repeat in sorted({a.equal_repeat, a.repeat}):
         wrong = sum(r["equal"][str(repeat)] for r in results)
         lines = sum(r["equal_lines"][str(repeat)] for r in results)

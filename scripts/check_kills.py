@@ -142,12 +142,14 @@ def main():
     a = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         problems, hits, sweeps, points = torture(Sweep(a.program, folder), a.kills, random.Random(a.seed))
+        conditions = experiment_runs.conditions(experiment_runs.read_records(pathlib.Path(folder) / "undisturbed")[0])
     text = (f"{hits['run']} kills of `amrtex run` and {hits['child']} of its measuring process, over {sweeps} sweeps of {points} points: "
             f"{len(problems)} records lost, doubled, torn or different, or files left over.\n")
     text += "".join(f"- {p}\n" for p in problems)
     print(text, end="")
     if a.out:
-        pathlib.Path(a.out).write_text("# Kills\n\nMade by `scripts/check_kills.py`.\n\n" + text)
+        made_by = f"Made by `scripts/check_kills.py`, seed {a.seed}: quickstart at 48 x 48, {conditions}."
+        pathlib.Path(a.out).write_text(f"# Kills\n\n{made_by}\n\n{text}")
     return 1 if problems else 0
 
 

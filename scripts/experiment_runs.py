@@ -51,6 +51,12 @@ def run(program, experiment, environment=None):
         return read_records(out)
 
 
+def conditions(record):
+    """One line: what drew it, on what, by which program, when."""
+    c = record["context"]
+    return f"{c['renderer']} on {c['cores']} cores of {c['cpu']}, {c['build_type']} of commit {(c['commit'] or 'unknown')[:12]}, {c['date'][:10]}"
+
+
 # what a record says of the point that was asked for; the rest is what came of it
 ASKED = ("dataset.name", "encoding", "build_parameters", "filter", "storage", "filtering", "render")
 

@@ -110,21 +110,28 @@ TEST(Advice, TellsTheNearestWhereNothingReachesTheError) {
   for (const MeasuredCandidate& m : advice.measured) EXPECT_LE(advice.measured[*advice.nearest].error, m.error);
 }
 
-/// The measure, which notes each structure's filter that it hears of.
-Measure listening(const AdviceRequest& request, std::set<Filter>& heard) {
-  return [measure = made_up_measure(request), &heard](std::span<const Candidate> candidates, const Effort& effort) {
-    for (const Candidate& c : candidates) heard.insert(c.build.filter);
-    return measure(candidates, effort);
-  };
+/// What is advised where one filter has an error and all others another, and the filters that were measured for it.
+struct FilteredAdvice {
+  Advice advice;
+  std::set<Filter> measured;
+};
+
+FilteredAdvice advise_with_filter_errors(const AdviceRequest& request, Filter good, double error, double of_others) {
+  FilteredAdvice result;
+  result.advice = advise(
+      request, Effort{},
+      [&](std::span<const Candidate> candidates, const Effort& effort) {
+        for (const Candidate& c : candidates) result.measured.insert(c.build.filter);
+        return made_up_measure(request)(candidates, effort);
+      },
+      [&](const BuildPoint& build, const Effort&) { return std::optional(build.filter == good ? error : of_others); });
+  return result;
 }
 
 TEST(Advice, MeasuresNoFilterThatCannotReachTheError) {
   AdviceRequest request;
-  std::set<Filter> heard;
-  const Advice advice = advise(request, Effort{}, listening(request, heard), [](const BuildPoint& build, const Effort&) {
-    return std::optional(build.filter == Filter::linear_vertex ? 0.0 : 0.5);
-  });
-  EXPECT_THAT(heard, testing::ElementsAre(Filter::linear_vertex));
+  const auto [advice, measured] = advise_with_filter_errors(request, Filter::linear_vertex, 0, 0.5);
+  EXPECT_THAT(measured, testing::ElementsAre(Filter::linear_vertex));
   expect_best_of_measured(advice, request);
   EXPECT_EQ(advice.lost.size() + 1, candidate_builds(request).size());
   EXPECT_THAT(advice.lost, Contains(Field(&Loss::reason, HasSubstr("its filter does not reach the error at any step: 0.5"))));
@@ -132,11 +139,27 @@ TEST(Advice, MeasuresNoFilterThatCannotReachTheError) {
 
 TEST(Advice, GoesOnWithTheNearestFiltersWhereNoneReachesTheError) {
   AdviceRequest request;
-  std::set<Filter> heard;
-  const Advice advice = advise(request, Effort{}, listening(request, heard), [](const BuildPoint& build, const Effort&) {
-    return std::optional(build.filter == Filter::basis ? 0.2 : 0.5);
+  EXPECT_THAT(advise_with_filter_errors(request, Filter::basis, 0.2, 0.5).measured, testing::ElementsAre(Filter::basis));
+}
+
+// One encoding misses the tolerance at any step of the midpoint rule and reaches it pre-integrated, where it is the fastest of
+// all.
+TEST(Advice, FindsAStructureThatOnlyPreintegrationMakesExact) {
+  AdviceRequest request;
+  const std::string sharp = candidate_builds(request).front().encoding;
+  const Measure measure = made_up_measure(request);
+  const Advice advice = advise(request, Effort{}, [&](std::span<const Candidate> candidates, const Effort& effort) {
+    std::vector<Json> records = measure(candidates, effort);
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      if (candidates[i].build.encoding != sharp || !records[i]["frame"].is_object()) continue;
+      const bool preintegrated = candidates[i].settings.integrator == Integrator::preintegrated;
+      records[i]["error_common"]["p95_seen"] = preintegrated ? 0.0 : 0.5;
+      records[i]["frame"]["wall_ms"]["median"] = 1e-3;
+    }
+    return records;
   });
-  EXPECT_THAT(heard, testing::ElementsAre(Filter::basis));
+  ASSERT_TRUE(advice.chosen);
+  EXPECT_EQ(advice.measured[*advice.chosen].candidate.build.encoding, sharp);
 }
 
 TEST(Advice, TriesALevelOfDetailBesideTheWhole) {
@@ -252,8 +275,8 @@ TEST(Advice, IsGoodOnASmallMeshThatIsReallyMeasured) {
   RunOptions options;
   options.folder = name;
   const Effort full{96, 96, 1, 0};
-  const Advice advice = advise(request, full, measure_by_running(scene, request, options),
-                               filter_error_by_reference(scene, request, options));
+  const Advice advice =
+      advise(request, full, measure_by_running(scene, request, options), filter_error_by_reference(scene, request, options));
   expect_best_of_measured(advice, request);
   EXPECT_EQ(load_records(name).front().at("experiment"), "advise");
 

@@ -115,8 +115,7 @@ class Search {
     Shapes shapes;
     for (const BuildPoint& build : candidate_builds(request_)) shapes[shape_key(build)].push_back(build);
     std::vector<MeasuredCandidate> coarse = one_of_each_shape(with_good_filters(shapes));
-    if (std::none_of(coarse.begin(), coarse.end(), [&](const auto& m) { return m.error <= slack(); }))
-      add(coarse, measured(drawn_most_exactly(coarse), coarse_, "more exact"));
+    add(coarse, measured(missing_drawn_most_exactly(coarse), coarse_, "more exact"));
     const std::vector<BuildPoint> best = fastest_builds(within_slack(best_of_each_build(coarse)), kCoarseShapes);
     // in the order in which shaders take longer to compile
     add(coarse, measured(with_settings(variants(best, shapes), Integrator::exponential_midpoint), coarse_,
@@ -159,7 +158,7 @@ class Search {
     return good;
   }
 
-  /// Each shape in the first storage that fits, with the finest steps: what that cannot reach, no other storage reaches.
+  /// Each shape in the first storage that fits, with a fine step.
   std::vector<MeasuredCandidate> one_of_each_shape(const Shapes& shapes) {
     std::vector<MeasuredCandidate> all;
     std::set<std::string> fitting;
@@ -187,10 +186,12 @@ class Search {
     return all;
   }
 
-  static std::vector<Candidate> drawn_most_exactly(const std::vector<MeasuredCandidate>& of) {
-    std::vector<Candidate> all;
-    for (const MeasuredCandidate& m : of) all.push_back({m.candidate.build, most_exact_settings()});
-    return all;
+  /// Those that miss the tolerance with a fine step: perhaps another integrator reaches it.
+  std::vector<Candidate> missing_drawn_most_exactly(const std::vector<MeasuredCandidate>& all) const {
+    std::vector<Candidate> missing;
+    for (const MeasuredCandidate& m : all)
+      if (m.error > slack()) missing.push_back({m.candidate.build, most_exact_settings()});
+    return missing;
   }
 
   double slack() const { return request_.tolerance * kCoarseSlack; }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <set>
 #include <vector>
 
@@ -144,12 +145,13 @@ void draw_references(const Experiment& experiment, LoadedData& data, const std::
       }
     } catch (const OutputError&) {
       throw;
-    } catch (const Error&) {  // the point's own record tells it
+    } catch (const std::exception&) {  // a shortage of memory too: the point's own record tells it
     }
   }
 }
 
-double filter_error(const Experiment& experiment, LoadedData& data, const AskedPoint& point, const std::filesystem::path& references) {
+double filter_error(const Experiment& experiment, LoadedData& data, const AskedPoint& point,
+                    const std::filesystem::path& references) {
   const Scene scene = reference_scene(experiment, scene_of(experiment, point.render));
   const auto drawn = [&](const FilterDefinition& filter) {
     return cached_reference(request_of(experiment, data, scene, filter), references).picture;

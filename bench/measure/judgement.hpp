@@ -36,7 +36,7 @@ void draw_references(const Experiment& experiment, LoadedData& data, const std::
                      const std::filesystem::path& references);
 
 /// What the filter of a point does beside the common one of the experiment, both by the double reference: the error that 95 % of the pixels
-/// that see something do not exceed. No structure is built; no storage and no step makes it smaller.
+/// that see something do not exceed. No structure is built: steps and storages add errors of their own.
 double filter_error(const Experiment& experiment, LoadedData& data, const AskedPoint& point, const std::filesystem::path& references);
 
 /// What a picture is against its own reference.

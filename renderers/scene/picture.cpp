@@ -5,20 +5,20 @@
 #include <xxhash.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <limits>
 
 #include "structures/mesh/npy.hpp"
 #include "structures/mesh/error.hpp"
 #include "structures/mesh/value_units.hpp"
 #include "structures/mesh/whole_file.hpp"
+#include "structures/readers/reader_tools.hpp"
 
 namespace amrtex {
 namespace {
+
+constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 36;  // of a file: what is larger is no picture of ours
 
 std::vector<float> as_floats(const Picture& picture) {
   std::vector<float> floats(picture.values.size());
@@ -42,14 +42,6 @@ bool fits_floats(const Picture& picture) {
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {
   throw Error(fmt::format("{}: {}", path.string(), why));
-}
-
-std::string text_of(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) refuse(path, fmt::format("cannot be opened: {}", std::strerror(errno)));
-  std::string text(std::istreambuf_iterator<char>(in), {});
-  if (in.bad()) refuse(path, "cannot be read");
-  return text;
 }
 
 template <class T>
@@ -76,7 +68,7 @@ void write_npy(const Picture& picture, const std::filesystem::path& path, bool a
 }
 
 Picture read_npy(const std::filesystem::path& path) {
-  const NpyArray array = parse_npy(text_of(path), path.string(), {"<f4", "<f8"});
+  const NpyArray array = parse_npy(load_bytes(path, kMostBytes), path.string(), {"<f4", "<f8"});
   constexpr std::int64_t kMost = std::numeric_limits<int>::max();
   const auto& s = array.shape;
   if (s.size() != 3 || *std::min_element(s.begin(), s.end()) < 1 || *std::max_element(s.begin(), s.end()) > kMost || s[2] > 16)
