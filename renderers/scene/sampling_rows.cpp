@@ -114,6 +114,15 @@ Rows picture_rows() {
                    .column = {"skip"}},
                   [](const Scene& s) -> Json { return s.settings.skip; },
                   [](Scene& s, const Json& v) { s.settings.skip = v.get<bool>(); }});
+  rows.push_back(
+      {{.name = "leap",
+        .type = boolean_type(),
+        .reference = AffectsReference::no,
+        .help = "rays leap over many hidden regions at a time, by a map of distances (modes `dvr` and `projection`)",
+        .column = {"leap"},
+        .takes = {means_nothing_unless("skip", {true})}},
+       [](const Scene& s) -> Json { return s.settings.leap; },
+       [](Scene& s, const Json& v) { s.settings.leap = v.get<bool>(); }});
   rows.push_back({{.name = "level_of_detail",
                    .type = number_above(0).or_null(),
                    .reference = AffectsReference::no,

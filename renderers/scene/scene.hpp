@@ -184,6 +184,7 @@ struct RenderSettings {
   int width = 512;                  ///< pixels
   int height = 512;                 ///< pixels
   bool skip = true;                 ///< regions that the transfer function makes invisible are skipped
+  bool leap = true;                 ///< and many at a time, over blocks of what is hidden
   std::optional<double> early_end;  ///< opacity at which a ray ends; off when absent
   bool prune = false;               ///< what the transfer function hides is not even built (mode dvr); then it may not change
   bool everything = false;          ///< structures hold also what the scene does not need, to see what leaving out saves
