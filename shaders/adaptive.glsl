@@ -146,23 +146,14 @@ void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
     Region r;
     bool skipped = true;
     do {  // the next region that can be seen: all lanes of a SIMD group then sample together
-      if (AMRTEX_LEAPS != 0) {
-        bool leaps = true;
-        do {
-          leaps = leap(p, r);
-          if (leaps) {
-            more = pass_box(ray, course, r, t, p);
-            count_region(a, true);
-            pass_region(a, true, r, t);
-          }
-        } while (leaps && more);
-      }
-      bool inside = march_locate(a, p, r);
+      bool leaped = AMRTEX_LEAPS != 0 && leap(p, course.forward, r);
+      bool inside = true;
+      if (!leaped) inside = march_locate(a, p, r);
       front.t = t;
       front.p = p;
-      skipped = !inside || region_invisible(a, r) || !more;
+      skipped = leaped || !inside || region_invisible(a, r);
       count_region(a, skipped);
-      more = pass_box(ray, course, r, t, p) && more;
+      more = pass_box(ray, course, r, t, p);
       if (skipped) pass_region(a, inside, r, t);
     } while (skipped && more);
     if (AMRTEX_SKIPS_IN_STAGES && !skipped) open_region(r);

@@ -183,26 +183,11 @@ Position lattice_position(IN(LatticeBlock) block, IN(real) i) {
   return p;
 }
 
-// The first sample from i on of a block that may be seen, or `count`.
-int leap_in_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(vec3r) inverse_step, IN(int) from, IN(int) count) {
-  Region r;
-  int i = from;
-  bool leaps = true;
-  do {
-    leaps = leap(lattice_position(block, real(i)), r);
-    if (leaps) {
-      i = lattice_exit(block, inverse_step, r, i, count);
-      count_region(a, true);
-      pass_region(a, true, r, lattice_place(block, real(i) - real(0.5)));
-    }
-  } while (leaps && i < count);
-  return i;
-}
-
 // From sample `from` of the block; returns the one across a surface, or `count`.
 int march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) from, IN(int) count) {
   bool stencils = AMRTEX_STENCILS;  // their own cells decide where they end
   vec3r inverse_step = safe_inverse(block.step);
+  bvec3 up = greaterThanEqual(block.step, vec3r(0));
   int i = from;
   if (i < count) {
     do {
@@ -210,11 +195,13 @@ int march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) f
       int first = i;
       bool skipped = true;
       do {  // the next region that can be seen: all lanes of a SIMD group then sample together
-        if (AMRTEX_LEAPS != 0) i = leap_in_block(a, block, inverse_step, i, count);
-        first = min(i, count - 1);
-        bool inside = march_locate(a, lattice_position(block, real(first)), r);
-        skipped = !inside || region_invisible(a, r) || i == count;
-        if (skipped || !stencils) i = lattice_exit(block, inverse_step, r, first, count);
+        first = i;
+        Position p = lattice_position(block, real(i));
+        bool leaped = AMRTEX_LEAPS != 0 && leap(p, up, r);
+        bool inside = true;
+        if (!leaped) inside = march_locate(a, p, r);
+        skipped = leaped || !inside || region_invisible(a, r);
+        if (skipped || !stencils) i = lattice_exit(block, inverse_step, r, i, count);
         count_region(a, skipped);
         if (skipped) pass_region(a, inside, r, lattice_place(block, real(i) - real(0.5)));
         if (AMRTEX_PREINTEGRATED && skipped && inside) pass_points(a, block, r, first, i);

@@ -1,8 +1,7 @@
 // Rays that leap over hidden blocks: the grid of ranges, and pictures with and without.
-#include "renderers/bindings/leap_bindings.hpp"
-
 #include <gtest/gtest.h>
 
+#include "renderers/bindings/leap_bindings.hpp"
 #include "structures/common/build_tools.hpp"
 #include "structures/generators/random_mesh.hpp"
 #include "tests/pictures.hpp"
@@ -47,7 +46,7 @@ Scene half_hidden(const AmrHierarchy& h, Sampling sampling) {
 }
 
 Scene without_leaps(Scene scene) {
-  scene.settings.leap = false;
+  scene.settings.leap = Leap::off;
   return scene;
 }
 
@@ -120,7 +119,7 @@ TEST(Leaps, AreLeftOutWhereNothingIsHiddenAndWhereTheRayDecides) {
     EXPECT_EQ(leaps_define(h, field, all_seen), 0);
     Scene all_hidden = scene;
     all_hidden.transfer_function.extinction = {{0, 0}};
-    EXPECT_EQ(leaps_define(h, field, all_hidden), field.leaps.empty() ? 0 : 1);
+    EXPECT_EQ(leaps_define(h, field, all_hidden), field.leaps.empty() ? 0 : 2);
     for (const Mode mode : {Mode::mip, Mode::iso}) {
       Scene other = all_hidden;
       other.settings.mode = mode;

@@ -1,5 +1,7 @@
 #include "renderers/bindings/leap_bindings.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -17,8 +19,8 @@ float as_float(double v) { return static_cast<float>(v); }
 bool leaps(const EncodedField& field, const Scene& scene) {
   const RenderSettings& s = scene.settings;
   const bool from_ranges_alone = s.mode == Mode::dvr || (s.mode == Mode::projection && field.scale.units.offset == 0);
-  return s.skip && s.leap && from_ranges_alone && s.integrator != Integrator::preintegrated && scene.more_fields.empty() &&
-         s.consumer == ConsumerKind::raycast && !s.prunes_levels() && !field.leaps.empty();
+  return s.skip && s.leap != Leap::off && from_ranges_alone && s.integrator != Integrator::preintegrated &&
+         scene.more_fields.empty() && s.consumer == ConsumerKind::raycast && !s.prunes_levels() && !field.leaps.empty();
 }
 
 /// As region_invisible() in shaders/sample.glsl, in floats.
@@ -45,6 +47,15 @@ class Hides {
 };
 
 /// Four distances a word.
+std::vector<std::uint8_t> octants(const Vec3i& blocks, const std::vector<std::uint8_t>& seen) {
+  std::vector<std::uint8_t> all(8 * seen.size());
+  tbb::parallel_for(0, 8, [&](int octant) {
+    const std::vector<std::uint8_t> one = octant_distances(blocks, seen, octant);
+    std::copy(one.begin(), one.end(), all.begin() + octant * std::ssize(seen));
+  });
+  return all;
+}
+
 HostTexture packed(const std::vector<std::uint8_t>& distances) {
   HostTexture buffer = make_buffer("leap_distances", TexelFormat::r32ui, static_cast<std::int64_t>((distances.size() + 3) / 4));
   auto* words = buffer.as<std::uint32_t>();
@@ -63,10 +74,10 @@ void add_leaps(const EncodedField& field, const Scene& stored, SceneBindings& b)
                    [&](std::uint32_t code) { return hides(code) ? 0 : 1; });
   }
   const bool any_hidden = std::find(seen.begin(), seen.end(), 0) != seen.end();
-  b.define("AMRTEX_LEAPS", any_hidden ? 1 : 0);
+  b.define("AMRTEX_LEAPS", any_hidden ? static_cast<int>(stored.settings.leap) : 0);
   if (!any_hidden) return;
   const Vec3i& blocks = field.leaps.blocks;
-  b.buffers.push_back(packed(chessboard_distances(blocks, seen)));
+  b.buffers.push_back(packed(stored.settings.leap == Leap::octant ? octants(blocks, seen) : chessboard_distances(blocks, seen)));
   b.uniforms.push_back({"u_leap_blocks", std::vector<int>{blocks.x, blocks.y, blocks.z}});
   b.set("u_leap_shift", field.leaps.shift);
 }

@@ -116,13 +116,15 @@ Rows picture_rows() {
                   [](Scene& s, const Json& v) { s.settings.skip = v.get<bool>(); }});
   rows.push_back(
       {{.name = "leap",
-        .type = boolean_type(),
+        .type = choice_type(texts_of(kLeapNames)),
         .reference = AffectsReference::no,
-        .help = "rays leap over many hidden regions at a time, by a map of distances (modes `dvr` and `projection`)",
+        .help =
+            "hidden regions are passed many at a time by a map of distances ([docs/sampling.md](sampling.md#skipping)), in modes "
+            "`dvr` and `projection`: `cube` one map, `octant` one for each octant of directions",
         .column = {"leap"},
         .takes = {means_nothing_unless("skip", {true})}},
-       [](const Scene& s) -> Json { return s.settings.leap; },
-       [](Scene& s, const Json& v) { s.settings.leap = v.get<bool>(); }});
+       [](const Scene& s) -> Json { return leap_name(s.settings.leap); },
+       [](Scene& s, const Json& v) { s.settings.leap = parse_leap(v.get<std::string>()); }});
   rows.push_back({{.name = "level_of_detail",
                    .type = number_above(0).or_null(),
                    .reference = AffectsReference::no,

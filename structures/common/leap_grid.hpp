@@ -18,8 +18,8 @@ struct LeapGrid {
   std::vector<std::uint32_t> ranges;  ///< x fastest; kNoRange where no region was covered
   bool empty() const { return ranges.empty(); }
 
-  /// Blocks of the fewest cells of which a domain of `cells` (finest) has at most kMostBlocks. Empty for domains of more than 2^30
-  /// cells along an axis.
+  /// Blocks of the fewest cells of which a domain of `cells` (finest) has at most kMostBlocks. Empty for domains of more than
+  /// 2^30 cells along an axis.
   static LeapGrid over(const Vec3i& cells);
   /// `box`: finest, inside the domain. kNoRange covers nothing.
   void cover(const Box& box, std::uint32_t range);
