@@ -103,44 +103,61 @@ real march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(
   return i - real(1);
 }
 
+// What a ray's direction tells of how it leaves boxes.
+STRUCT Course {
+  bvec3 forward;
+  ray_vec3 inverse;  // units a finest cell along each axis
+  ray_vec3 still;    // added to where it leaves: along an axis that it does not move on, through no face, wherever rounding put it
+};
+
+Course course_of(IN(Ray) ray) {
+  Course course;
+  ray_vec3 speed = abs(ray.direction);
+  course.forward = greaterThan(ray.direction, ray_vec3(0));
+  course.still = ray_vec3(lessThan(speed, ray_vec3(1e-20))) * ray_real(1e30);
+  course.inverse = ray_real(1) / max(speed, ray_vec3(1e-20));
+  return course;
+}
+
+// Passes the box of r, in which the ray is at t: t and p are then behind its face. Returns whether the ray goes on.
+// Where the ray meets a face follows from ray and face alone: whatever lies before it, one hidden region or many, the next
+// region is entered at the same place to the bit, and lengths sum to the chord.
+bool pass_box(IN(Ray) ray, IN(Course) course, IN(Region) r, INOUT(ray_real) t, INOUT(Position) p) {
+  ray_vec3 lower = ray.entry - ray_vec3(r.lower);
+  ray_vec3 upper = ray_vec3(r.upper) - ray.entry;
+  bvec3 forward = course.forward;
+  ray_vec3 ahead = ray_vec3(forward.x ? upper.x : lower.x, forward.y ? upper.y : lower.y, forward.z ? upper.z : lower.z);
+  ray_vec3 exits = ahead * course.inverse + course.still;
+  t = max(min(exits.x, min(exits.y, exits.z)), t);
+  bool x = exits.x <= min(exits.y, exits.z);
+  bool y = !x && exits.y <= exits.z;
+  p = leave_region(ray, r, t, bvec3(x, y, !x && !y));
+  return t < ray.length && all(greaterThanEqual(p.cell, ivec3(0))) && all(lessThan(p.cell, u_domain_cells));
+}
+
 void march_adaptive(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
   vec3r direction = vec3r(ray.direction);
-  bvec3 forward = greaterThan(ray.direction, ray_vec3(0));
-  ray_vec3 speed = abs(ray.direction);
-  // along an axis that it does not move on, a ray leaves through no face, wherever rounding put it
-  ray_vec3 still = ray_vec3(lessThan(speed, ray_vec3(1e-20))) * ray_real(1e30);
-  ray_vec3 inverse = ray_real(1) / max(speed, ray_vec3(1e-20));
+  Course course = course_of(ray);
   ray_real t = front.t;
   Position p = front.p;
   real part = front.part;
   bool more = true;
   do {
     Region r;
-    ray_real length = ray_real(0);
     bool skipped = true;
     do {  // the next region that can be seen: all lanes of a SIMD group then sample together
-      bool inside = march_locate(a, p, r);
+      bool leaped = AMRTEX_LEAPS != 0 && leap(p, course.forward, r);
+      bool inside = true;
+      if (!leaped) inside = march_locate(a, p, r);
       front.t = t;
       front.p = p;
-      // Where the ray meets a face follows from ray and face alone: whatever lies before it, one hidden region or many, the next
-      // region is entered at the same place to the bit, and lengths sum to the chord.
-      ray_vec3 lower = ray.entry - ray_vec3(r.lower);
-      ray_vec3 upper = ray_vec3(r.upper) - ray.entry;
-      ray_vec3 ahead = ray_vec3(forward.x ? upper.x : lower.x, forward.y ? upper.y : lower.y, forward.z ? upper.z : lower.z);
-      ray_vec3 exits = ahead * inverse + still;
-      ray_real next = max(min(exits.x, min(exits.y, exits.z)), t);
-      more = next < ray.length;
-      length = max((more ? next : ray.length) - t, ray_real(0));
-      skipped = !inside || region_invisible(a, r);
+      skipped = leaped || !inside || region_invisible(a, r);
       count_region(a, skipped);
-      if (skipped) pass_region(a, inside, r, next);
-      t = next;
-      bool x = exits.x <= min(exits.y, exits.z);
-      bool y = !x && exits.y <= exits.z;
-      p = leave_region(ray, r, t, bvec3(x, y, !x && !y));
-      more = more && all(greaterThanEqual(p.cell, ivec3(0))) && all(lessThan(p.cell, u_domain_cells));
+      more = pass_box(ray, course, r, t, p);
+      if (skipped) pass_region(a, inside, r, t);
     } while (skipped && more);
     if (AMRTEX_SKIPS_IN_STAGES && !skipped) open_region(r);
+    ray_real length = max(min(t, ray.length) - front.t, ray_real(0));
     vec3r f = vec3r(ray_vec3(front.p.cell - r.lower) + ray_vec3(front.p.fraction));  // as exact as the ray before it is rounded
     if (!skipped && length > ray_real(0)) front.part = march_adaptive_region(a, r, f, direction, real(length), front.t, part, ray.phase);
     part = real(0.5);

@@ -187,6 +187,7 @@ Position lattice_position(IN(LatticeBlock) block, IN(real) i) {
 int march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) from, IN(int) count) {
   bool stencils = AMRTEX_STENCILS;  // their own cells decide where they end
   vec3r inverse_step = safe_inverse(block.step);
+  bvec3 up = greaterThanEqual(block.step, vec3r(0));
   int i = from;
   if (i < count) {
     do {
@@ -195,8 +196,11 @@ int march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) f
       bool skipped = true;
       do {  // the next region that can be seen: all lanes of a SIMD group then sample together
         first = i;
-        bool inside = march_locate(a, lattice_position(block, real(i)), r);
-        skipped = !inside || region_invisible(a, r);
+        Position p = lattice_position(block, real(i));
+        bool leaped = AMRTEX_LEAPS != 0 && leap(p, up, r);
+        bool inside = true;
+        if (!leaped) inside = march_locate(a, p, r);
+        skipped = leaped || !inside || region_invisible(a, r);
         if (skipped || !stencils) i = lattice_exit(block, inverse_step, r, i, count);
         count_region(a, skipped);
         if (skipped) pass_region(a, inside, r, lattice_place(block, real(i) - real(0.5)));

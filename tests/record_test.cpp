@@ -186,6 +186,14 @@ TEST(MemoryJson, AddsUpAndCountsValueTexelsACell) {
   EXPECT_EQ(memory_json(field, 32)["texels_per_cell"], 1.0);
 }
 
+TEST(MemoryJson, AMapOfLeapsIsTopology) {
+  Json memory = memory_json(EncodedField{}, 1);
+  add_leaps(memory, 400);
+  EXPECT_EQ(memory["total_bytes"], 400);
+  EXPECT_EQ(memory["by_role"]["topology"], 400);
+  EXPECT_EQ(memory["texels_by_texture"]["leap_distances"], 100);
+}
+
 // XXH3-128 of {"encoding":"uniform","n":3,"step":0.5}, as `xxh128sum` prints it.
 TEST(ConfigurationHash, DoesNotChangeFromVersionToVersion) {
   const Json configuration = {{"encoding", "uniform"}, {"step", 0.5}, {"n", 3}};

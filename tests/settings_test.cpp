@@ -130,6 +130,7 @@ const std::vector<Change>& changes() {
       {"width", "9"},
       {"height", "9"},
       {"skip", "false"},
+      {"leap", "\"off\""},
       {"level_of_detail", "2"},
       {"max_level", "0"},
       {"isovalues", "[0.5, 0.7]", Mode::iso},

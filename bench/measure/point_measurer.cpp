@@ -168,6 +168,7 @@ Json PointMeasurer::measure_one(const BuildPoint& build, Built& built, const Ren
   Json record = blank_record(Status::ok);
   describe(record, build, render, repetition);
   describe_structure(record, built, data_.mesh());
+  add_leaps(record["memory"], consumer->leap_bytes());
   record["first_frame_ms"] = first_frame_ms;
   if (!scene.settings.triangles.empty()) record["triangle_seconds"] = consumer->triangle_seconds();
   record["image_hash"] = picture_hash(picture);

@@ -354,6 +354,14 @@ Json memory_json(const EncodedField& field, std::int64_t leaf_cells) {
       {"host_peak_bytes", field.host_peak_bytes}};
 }
 
+void add_leaps(Json& memory, std::int64_t bytes) {
+  if (bytes == 0) return;
+  memory["total_bytes"] = memory["total_bytes"].get<std::int64_t>() + bytes;
+  Json& topology = memory["by_role"]["topology"];
+  topology = topology.get<std::int64_t>() + bytes;
+  memory["texels_by_texture"]["leap_distances"] = bytes / 4;
+}
+
 Json left_out_json(const EncodedField& field) {
   Json list = Json::array();
   for (const LeftOut& item : field.left_out)

@@ -30,6 +30,8 @@ const Json& value_at(const Json& json, std::string_view pointer);
 /// Parts of records. Times in milliseconds.
 Json timing_json(std::span<const double> samples_ms);  ///< {"median", "mad", "ci95", "min", "n"}; null without samples
 Json memory_json(const EncodedField& field, std::int64_t leaf_cells);
+/// Adds a scene's map of leaps to the memory of what it was made for, in role topology.
+void add_leaps(Json& memory, std::int64_t bytes);
 Json left_out_json(const EncodedField& field);
 Json error_json(const ErrorMetrics& error, std::string_view reference_hash);
 

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "renderers/bindings/finest_camera.hpp"
+#include "renderers/bindings/leap_bindings.hpp"
 #include "renderers/bindings/light_bindings.hpp"
 #include "renderers/bindings/picture_units.hpp"
 #include "renderers/bindings/scene_needs.hpp"
@@ -157,6 +158,7 @@ SceneBindings bind_scene(const DomainGeometry& geometry, const EncodedField& fie
   add_picture_units(geometry, field, scene, b);
   add_march(geometry, scene, b);
   add_transfer_function(geometry, stored, b);
+  add_leaps(field, stored, b);
   add_clip_planes(geometry, s, b);
   add_ray_offset(s, b);
   add_mirror(s, b);

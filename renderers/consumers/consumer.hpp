@@ -36,6 +36,8 @@ class Consumer {
   virtual bool transfer_exact() const = 0;
   /// That finding where rays meet the scene's triangles took, before the first draw; 0 where it has none.
   virtual double triangle_seconds() const { return 0; }
+  /// Of the map by which rays leap over what is hidden; 0 where there is none.
+  virtual std::int64_t leap_bytes() const { return 0; }
 };
 
 }  // namespace amrtex

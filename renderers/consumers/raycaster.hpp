@@ -22,6 +22,7 @@ class Raycaster final : public Consumer {
   const Program& program() const { return program_; }
   bool transfer_exact() const override { return resources_.transfer_exact(); }
   double triangle_seconds() const override { return resources_.triangle_seconds(); }
+  std::int64_t leap_bytes() const override { return resources_.bytes_of("leap_distances"); }
 
  private:
   Program make_program(bool counting) const;

@@ -38,4 +38,10 @@ int SceneResources::buffer_count() const {
   return static_cast<int>(std::count_if(field_->textures.begin(), field_->textures.end(), is_buffer) + std::ssize(buffers_));
 }
 
+std::int64_t SceneResources::bytes_of(std::string_view buffer) const {
+  const auto it =
+      std::find_if(bindings_.buffers.begin(), bindings_.buffers.end(), [&](const HostTexture& b) { return b.name == buffer; });
+  return it == bindings_.buffers.end() ? 0 : it->bytes();
+}
+
 }  // namespace amrtex

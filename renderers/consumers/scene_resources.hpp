@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "renderers/bindings/scene_bindings.hpp"
@@ -21,6 +22,8 @@ class SceneResources {
   void bind(Program& program, const GpuField& gpu) const;
   /// Storage buffers of field and scene.
   int buffer_count() const;
+  /// Of a buffer that the scene adds; 0 where it does not.
+  std::int64_t bytes_of(std::string_view buffer) const;
   const PictureUnits& picture_units() const { return bindings_.picture; }
   bool transfer_exact() const { return bindings_.transfer_exact; }
   double triangle_seconds() const { return bindings_.triangle_seconds; }

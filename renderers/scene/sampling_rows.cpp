@@ -114,6 +114,17 @@ Rows picture_rows() {
                    .column = {"skip"}},
                   [](const Scene& s) -> Json { return s.settings.skip; },
                   [](Scene& s, const Json& v) { s.settings.skip = v.get<bool>(); }});
+  rows.push_back(
+      {{.name = "leap",
+        .type = choice_type(texts_of(kLeapNames)),
+        .reference = AffectsReference::no,
+        .help =
+            "hidden regions are passed many at a time by a map of distances ([docs/sampling.md](sampling.md#skipping)), in modes "
+            "`dvr` and `projection`: `cube` one map, `octant` one for each octant of directions",
+        .column = {"leap"},
+        .takes = {means_nothing_unless("skip", {true})}},
+       [](const Scene& s) -> Json { return leap_name(s.settings.leap); },
+       [](Scene& s, const Json& v) { s.settings.leap = parse_leap(v.get<std::string>()); }});
   rows.push_back({{.name = "level_of_detail",
                    .type = number_above(0).or_null(),
                    .reference = AffectsReference::no,

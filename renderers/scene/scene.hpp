@@ -81,6 +81,9 @@ void validate(const TransferFunction& transfer_function);
 /// `iso` draws isosurfaces, `dvr_iso` isosurfaces inside the volume.
 enum class Mode { dvr, projection, mip, iso, dvr_iso };
 enum class Sampling { lattice, adaptive };
+/// How rays pass what is hidden (the same numbers as AMRTEX_LEAPS_... in shaders/leap.glsl): region by region, by one map of
+/// distances, or by one for each octant of directions.
+enum class Leap { off, cube, octant };
 /// Who draws: the raycaster in one pass, or one of those that draw the field's boxes one by one (box_consumer.hpp).
 enum class ConsumerKind { raycast, multipass, slices, stencil_slices };
 /// What slices are blended in. Eight bits a channel are the historical control: 256 slices are off by 0.1.
@@ -96,6 +99,7 @@ enum class Output { color, depth, normal };
 enum class Shading { none, gradient, central, clamped, analytic };
 std::string_view mode_name(Mode mode);
 std::string_view sampling_name(Sampling sampling);
+std::string_view leap_name(Leap leap);
 std::string_view consumer_name(ConsumerKind consumer);
 std::string_view slice_target_name(SliceTarget target);
 std::string_view integrator_name(Integrator integrator);
@@ -104,6 +108,7 @@ std::string_view shading_name(Shading shading);
 /// These throw UsageErrors that name the accepted ones.
 Mode parse_mode(std::string_view name);
 Sampling parse_sampling(std::string_view name);
+Leap parse_leap(std::string_view name);
 ConsumerKind parse_consumer(std::string_view name);
 SliceTarget parse_slice_target(std::string_view name);
 Integrator parse_integrator(std::string_view name);
@@ -184,6 +189,7 @@ struct RenderSettings {
   int width = 512;                  ///< pixels
   int height = 512;                 ///< pixels
   bool skip = true;                 ///< regions that the transfer function makes invisible are skipped
+  Leap leap = Leap::octant;         ///< and many of them at a time
   std::optional<double> early_end;  ///< opacity at which a ray ends; off when absent
   bool prune = false;               ///< what the transfer function hides is not even built (mode dvr); then it may not change
   bool everything = false;          ///< structures hold also what the scene does not need, to see what leaving out saves

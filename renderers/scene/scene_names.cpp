@@ -28,6 +28,7 @@ auto value_in(const Names& names, std::string_view what, std::string_view text, 
 
 std::string_view mode_name(Mode mode) { return name_in(kModeNames, mode); }
 std::string_view sampling_name(Sampling sampling) { return name_in(kSamplingNames, sampling); }
+std::string_view leap_name(Leap leap) { return name_in(kLeapNames, leap); }
 std::string_view consumer_name(ConsumerKind consumer) { return name_in(kConsumerNames, consumer); }
 std::string_view slice_target_name(SliceTarget target) { return name_in(kSliceTargetNames, target); }
 std::string_view integrator_name(Integrator integrator) { return name_in(kIntegratorNames, integrator); }
@@ -36,6 +37,7 @@ std::string_view shading_name(Shading shading) { return name_in(kShadingNames, s
 
 Mode parse_mode(std::string_view name) { return value_in(kModeNames, "mode", name); }
 Sampling parse_sampling(std::string_view name) { return value_in(kSamplingNames, "sampling", name); }
+Leap parse_leap(std::string_view name) { return value_in(kLeapNames, "leap", name); }
 ConsumerKind parse_consumer(std::string_view name) { return value_in(kConsumerNames, "consumer", name); }
 SliceTarget parse_slice_target(std::string_view name) { return value_in(kSliceTargetNames, "slice_target", name); }
 Output parse_output(std::string_view name) { return value_in(kOutputNames, "output", name); }

@@ -12,6 +12,7 @@
 
 #include "structures/common/draw_tree.hpp"
 #include "structures/common/host_texture.hpp"
+#include "structures/common/leap_grid.hpp"
 #include "structures/common/parameter.hpp"
 #include "structures/common/part.hpp"
 #include "structures/mesh/amr_hierarchy.hpp"
@@ -106,6 +107,7 @@ struct EncodedField {
   ShaderPart shader;
   std::vector<HostTexture> textures;
   std::vector<std::pair<std::string, Vec3i>> integer_uniforms;  ///< ivec3 uniforms of the encoding's GLSL
+  LeapGrid leaps;      ///< empty where regions have no ranges, or where the encoding tells none: then rays pass region by region
   DrawTree draw_tree;  ///< empty where no consumer needs it, or where the encoding has no such boxes
   std::vector<LeftOut> left_out;
   Json statistics;                   ///< counts of the structure: pages, nodes, fill, ...

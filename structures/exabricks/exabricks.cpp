@@ -249,6 +249,14 @@ Json statistics(const Options& o, const Plan& p) {
   return json;
 }
 
+/// From the regions' ranges.
+LeapGrid leap_grid(const AmrHierarchy& h, const Plan& p, EncodedField& field) {
+  LeapGrid grid = LeapGrid::over(h.cells(h.finest_level()));
+  const auto* codes = field.find("exa_ranges")->as<std::uint32_t>();
+  for (const Region& r : p.set.regions) grid.cover(r.box, *codes++);
+  return grid;
+}
+
 EncodedField Exabricks::build(const AmrHierarchy& h, const BuildRequest& request) const {
   require_filter(*this, request.needs.filter);
   require_fields(*this, h, request);
@@ -272,6 +280,7 @@ EncodedField Exabricks::build(const AmrHierarchy& h, const BuildRequest& request
     write_brick_list(o, p, *field.find("exa_bricks"));
     p.supports.write(*field.find("basis_supports"));
   }
+  if (request.needs.value_ranges) field.leaps = leap_grid(h, p, field);
   field.statistics = statistics(o, p);
   add_shader_inputs(o, p, field);
   return field;

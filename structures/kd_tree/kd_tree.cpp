@@ -263,6 +263,17 @@ void write_bricks(const AmrHierarchy& h, const BuildRequest& request, const Opti
   });
 }
 
+/// From the leaves' ranges, as they were written.
+LeapGrid leap_grid(const AmrHierarchy& h, const Options& o, const Plan& p, EncodedField& field) {
+  LeapGrid grid = LeapGrid::over(h.cells(h.finest_level()));
+  const auto* words = field.find("kd_data")->as<std::uint32_t>() + (o.bindless ? 2 : 1);
+  for (const Leaf& leaf : p.tree.leaves) {
+    grid.cover(leaf.cells.refined(h.cell_width(leaf.level)), *words);
+    words += p.data_words;
+  }
+  return grid;
+}
+
 /// What only some structures have.
 void write_optional_parts(const AmrHierarchy& h, const Options& o, const Plan& p, EncodedField& field) {
   if (HostTexture* detail = field.find("kd_detail"))
@@ -336,6 +347,7 @@ EncodedField KdTree::build(const AmrHierarchy& h, const BuildRequest& request) c
   write_optional_parts(h, o, p, field);
   field.statistics = statistics(o, p);
   add_shader_inputs(request, o, p, field);
+  if (request.needs.value_ranges) field.leaps = leap_grid(h, o, p, field);
   if (request.needs.draw_boxes) set_draw_tree(field, make_draw_tree(h, p.tree));
   return field;
 }

@@ -7,6 +7,7 @@
 
 #include "octree_gradients.hpp"
 #include "octree_layout.h"
+#include "octree_leaps.hpp"
 #include "octree_ranges.hpp"
 #include "octree_reader.hpp"
 #include "octree_shape.hpp"
@@ -309,6 +310,7 @@ EncodedField Octree::build(const AmrHierarchy& h, const BuildRequest& request) c
   const bool gradients = o.paper_layout && o.store_gradients && request.needs.gradients;
   if (gradients) write_gradients(h, request, tree, reader, nodes);
   if (p.ranges) write_ranges(h, request, tree, reader, field);
+  if (request.needs.value_ranges) field.leaps = leap_grid(h, request, tree, reader, field);
   field.statistics = statistics(tree, p, counts_of(tree));
   add_shader_inputs(o, p, tree, field);
   field.shader.defines.emplace_back("AMRTEX_OCTREE_GRADIENTS", gradients ? 1 : 0);

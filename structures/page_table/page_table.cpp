@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 
 #include "page_draw_tree.hpp"
 #include "page_partition.hpp"
@@ -211,6 +212,18 @@ Json statistics(const AmrHierarchy& h, const Options& o, const std::vector<Page>
   return json;
 }
 
+LeapGrid leap_grid(const AmrHierarchy& h, const Options& o, const std::vector<Page>& pages, const EncodedField& field) {
+  LeapGrid grid = LeapGrid::over(h.cells(h.finest_level()));
+  for (const Page& p : pages) {
+    if (p.kind == AMRTEX_PAGE_ABSENT) continue;
+    const double constant = field.scale.units.value(static_cast<double>(std::bit_cast<float>(p.green)));
+    const bool stored = p.kind == AMRTEX_PAGE_STORED;  // then its range stands in the table
+    const Box cells = intersection(Box{p.index_in_level, p.index_in_level + Vec3i(1)}.refined(o.page_size), h.domain(p.level));
+    grid.cover(cells.refined(h.cell_width(p.level)), stored ? p.green : encode_range(field, 0, {constant, constant}));
+  }
+  return grid;
+}
+
 void add_shader_inputs(const AmrHierarchy& h, const Options& o, const Sizes& size, EncodedField& field) {
   const TablePlan& table = size.table;
   auto& defines = field.shader.defines;
@@ -264,6 +277,7 @@ EncodedField PageTable::build(const AmrHierarchy& h, const BuildRequest& request
   write_table(h, size.table, pages, field);
   field.statistics = statistics(h, o, pages, size);
   add_shader_inputs(h, o, size, field);
+  if (request.needs.value_ranges) field.leaps = leap_grid(h, o, pages, field);
   if (request.needs.draw_boxes) set_draw_tree(field, PageDrawTree(h, division, pages).tree());
   return field;
 }

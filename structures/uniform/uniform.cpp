@@ -245,6 +245,17 @@ class Writer {
   std::vector<std::uint8_t> missing_;  ///< a byte a cell of each field
 };
 
+/// From the blocks' ranges.
+LeapGrid leap_grid(const AmrHierarchy& h, const Plan& p, EncodedField& field) {
+  LeapGrid grid = LeapGrid::over(h.cells(h.finest_level()));
+  const auto* codes = field.find("dense_ranges")->as<std::uint32_t>();
+  for_each_cell(Box{Vec3i(0), p.blocks}, [&](const Vec3i& block) {
+    const Box cells = intersection(Box{block, block + Vec3i(1)}.refined(kBlock), h.domain(p.level));
+    grid.cover(cells.refined(h.cell_width(p.level)), *codes++);
+  });
+  return grid;
+}
+
 EncodedField Uniform::build(const AmrHierarchy& h, const BuildRequest& request) const {
   if (!request.needs.draw_boxes) return build_blocks(h, request);
   // the texture is one box; value ranges would divide it in regions
@@ -281,6 +292,7 @@ EncodedField Uniform::build_blocks(const AmrHierarchy& h, const BuildRequest& re
     writer.block({x, y, z});
   });
   writer.write_validity();
+  if (request.needs.value_ranges) field.leaps = leap_grid(h, p, field);
   field.statistics = {{"blocks", p.block_count()}};
   return field;
 }

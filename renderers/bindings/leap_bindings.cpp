@@ -1,0 +1,85 @@
+#include "renderers/bindings/leap_bindings.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+
+#include "renderers/bindings/distance_map.hpp"
+#include "renderers/bindings/transfer_bindings.hpp"
+#include "structures/common/build_tools.hpp"
+
+namespace amrtex {
+namespace {
+
+float as_float(double v) { return static_cast<float>(v); }
+
+/// May rays leap at all, as far as the scene tells?
+bool leaps(const EncodedField& field, const Scene& scene) {
+  const RenderSettings& s = scene.settings;
+  const bool from_ranges_alone = s.mode == Mode::dvr || (s.mode == Mode::projection && field.scale.units.offset == 0);
+  return s.skip && s.leap != Leap::off && from_ranges_alone && s.integrator != Integrator::preintegrated &&
+         scene.more_fields.empty() && s.consumer == ConsumerKind::raycast && !s.prunes_levels() && !field.leaps.empty();
+}
+
+/// As region_invisible() in shaders/sample.glsl, in floats.
+class Hides {
+ public:
+  Hides(const EncodedField& field, const Scene& stored) : origin_(as_float(field.range_origin)) {
+    if (stored.settings.mode == Mode::projection)
+      hidden_.push_back({0, 0});
+    else
+      for (const auto& [from, to] : invisible_ranges(stored.transfer_function)) hidden_.push_back({as_float(from), as_float(to)});
+  }
+
+  bool operator()(std::uint32_t code) const {
+    if (code == kNoRange) return true;
+    const float low = origin_ + std::bit_cast<float>(code << 16);
+    const float high = origin_ + std::bit_cast<float>(code & 0xffff0000U);
+    return std::any_of(hidden_.begin(), hidden_.end(),
+                       [&](const std::array<float, 2>& range) { return low >= range[0] && high <= range[1]; });
+  }
+
+ private:
+  float origin_;
+  std::vector<std::array<float, 2>> hidden_;
+};
+
+/// Four distances a word.
+std::vector<std::uint8_t> octants(const Vec3i& blocks, const std::vector<std::uint8_t>& seen) {
+  std::vector<std::uint8_t> all(8 * seen.size());
+  tbb::parallel_for(0, 8, [&](int octant) {
+    const std::vector<std::uint8_t> one = octant_distances(blocks, seen, octant);
+    std::copy(one.begin(), one.end(), all.begin() + octant * std::ssize(seen));
+  });
+  return all;
+}
+
+HostTexture packed(const std::vector<std::uint8_t>& distances) {
+  HostTexture buffer = make_buffer("leap_distances", TexelFormat::r32ui, static_cast<std::int64_t>((distances.size() + 3) / 4));
+  auto* words = buffer.as<std::uint32_t>();
+  for (std::size_t i = 0; i < distances.size(); ++i) words[i / 4] |= static_cast<std::uint32_t>(distances[i]) << (8 * (i % 4));
+  return buffer;
+}
+
+}  // namespace
+
+void add_leaps(const EncodedField& field, const Scene& stored, SceneBindings& b) {
+  std::vector<std::uint8_t> seen;
+  if (leaps(field, stored)) {
+    const Hides hides(field, stored);
+    seen.resize(field.leaps.ranges.size());
+    std::transform(field.leaps.ranges.begin(), field.leaps.ranges.end(), seen.begin(),
+                   [&](std::uint32_t code) { return hides(code) ? 0 : 1; });
+  }
+  const bool any_hidden = std::find(seen.begin(), seen.end(), 0) != seen.end();
+  b.define("AMRTEX_LEAPS", any_hidden ? static_cast<int>(stored.settings.leap) : 0);
+  if (!any_hidden) return;
+  const Vec3i& blocks = field.leaps.blocks;
+  b.buffers.push_back(packed(stored.settings.leap == Leap::octant ? octants(blocks, seen) : chessboard_distances(blocks, seen)));
+  b.uniforms.push_back({"u_leap_blocks", std::vector<int>{blocks.x, blocks.y, blocks.z}});
+  b.set("u_leap_shift", field.leaps.shift);
+}
+
+}  // namespace amrtex
