@@ -843,12 +843,14 @@ fs::path write_flat_plotfile(const fs::path& folder) {
     const fs::path where = folder / fmt::format("Level_{}", number);
     fs::create_directories(where);
     write_text(where / "Cell_D_00000", data);
-    write_text(where / "Cell_H", fmt::format("1\n1\n1\n0\n(1 0\n{}\n)\n1\nFabOnDisk: Cell_D_00000 0\n\n1,1\n0,\n\n1,1\n9,\n\n", box));
+    write_text(where / "Cell_H",
+               fmt::format("1\n1\n1\n0\n(1 0\n{}\n)\n1\nFabOnDisk: Cell_D_00000 0\n\n1,1\n0,\n\n1,1\n9,\n\n", box));
   };
   level(0, Vec3i(0), Vec3i(4, 2, 1));
   level(1, Vec3i(2, 0, 0), Vec3i(4, 2, 1));
   write_text(folder / "Header",
-             "HyperCLaw-V1.1\n1\nphi\n2\n0.5\n1\n-1 0 \n1 1 \n2 \n((0,0) (3,1) (0,0)) ((0,0) (7,3) (0,0)) \n5 5 \n0.5 0.5 \n0.25 0.25 \n0\n"
+             "HyperCLaw-V1.1\n1\nphi\n2\n0.5\n1\n-1 0 \n1 1 \n2 \n((0,0) (3,1) (0,0)) ((0,0) (7,3) (0,0)) \n5 5 \n0.5 0.5 \n0.25 "
+             "0.25 \n0\n"
              "0\n0 1 0.5\n5\n-1 1\n0 1\nLevel_0/Cell\n1 1 0.5\n5\n-0.5 0.5\n0 0.5\nLevel_1/Cell\n");
   return folder;
 }

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 #include "structures/generators/random_mesh.hpp"
@@ -99,8 +100,9 @@ TEST(CellValues, WithoutAValueStayWithoutOne) {
   mesh.name = "gaps";
   mesh.root_cells = Vec3i(3, 1, 1);
   mesh.fields = {"f"};
-  mesh.levels = {{Patch{{Vec3i(0), {3, 1, 1}},
-                        {CellValues(CellArray<float>{1, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()})}}}};
+  mesh.levels = {{Patch{
+      {Vec3i(0), {3, 1, 1}},
+      {CellValues(CellArray<float>{1, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()})}}}};
   const AmrHierarchy h(std::move(mesh));
   EXPECT_EQ(h.statistics(0).cells_without_value, 2);
   EXPECT_EQ(h.statistics(0).max, 1);

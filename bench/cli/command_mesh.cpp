@@ -151,7 +151,9 @@ void add_mesh_commands(CLI::App& app, Command& chosen) {
   auto a = std::make_shared<Arguments>();
 
   CLI::App* info = app.add_subcommand("info", "levels, patches, cells, fields, ranges and hash of a data set");
-  info->add_option("data", a->input, "data set: AMReX plotfile, Chombo, AMReX-HDF5, Enzo, FLASH, VTKHDF, ExaBrick, npz, or a volume")->required();
+  info->add_option("data", a->input,
+                   "data set: AMReX plotfile, Chombo, AMReX-HDF5, Enzo, FLASH, VTKHDF, ExaBrick, npz, or a volume")
+      ->required();
   info->add_option("--field", a->field, "only this field; all of them otherwise, one after the other");
   info->add_flag("--json", a->json, "for programs");
   info->footer("Example: amrtex info data/amrex_tiny/plt00008");

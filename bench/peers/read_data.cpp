@@ -47,9 +47,10 @@ int main(int argc, char** argv) {
     const long read_peak = peak_bytes();
     const Clock::time_point built = Clock::now();
     const amrtex::AmrHierarchy mesh(std::move(read));
-    fmt::print(R"({{"field_bytes": {}, "read_seconds": {:.6f}, "mesh_seconds": {:.6f}, "read_peak_bytes": {}, "peak_bytes": {}, "cells": {}}})"
-               "\n",
-               bytes, read_seconds, seconds_since(built), read_peak - before, peak_bytes() - before, mesh.stored_cells());
+    fmt::print(
+        R"({{"field_bytes": {}, "read_seconds": {:.6f}, "mesh_seconds": {:.6f}, "read_peak_bytes": {}, "peak_bytes": {}, "cells": {}}})"
+        "\n",
+        bytes, read_seconds, seconds_since(built), read_peak - before, peak_bytes() - before, mesh.stored_cells());
   } catch (const amrtex::Error& e) {
     fmt::print(stderr, "read_data: {}\n", e.what());
     return 1;

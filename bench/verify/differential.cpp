@@ -336,7 +336,8 @@ Check written_and_read(int meshes, const std::string& ending) {
 void files(VerifyContext& v) {
   for (const auto& [format, ending] : {std::pair("AMReX plotfile", ""), std::pair(".cells", ".cells"), std::pair(".npz", ".npz"),
                                        std::pair("VTKHDF", ".vtkhdf")})
-    v.once(fmt::format("27 {}, written and read: one content hash", format), [&] { return written_and_read(v.size(6, 60), ending); });
+    v.once(fmt::format("27 {}, written and read: one content hash", format),
+           [&] { return written_and_read(v.size(6, 60), ending); });
   // formats that nothing here writes: real files, and what other readers found in them, are with each reader's tests
   const std::string readable = formats_read();
   for (const std::string format : {"Chombo", "AMReX-HDF5", "Enzo", "FLASH"}) {

@@ -235,8 +235,8 @@ void AmrHierarchy::Data::check_patches(int level) const {
       if (static_cast<std::int64_t>(values.size()) != box.cells())
         refuse(fmt::format("level {}, patch {}: {} values for {} cells", level, k, values.size(), box.cells()));
     if (level > 0 && cuts_stored_cell(level, box))
-      refuse(fmt::format("level {}, patch {}: the box {} does not align with the cells of level {} (refinement ratio {})", level, k,
-                         text(box), level - 1, mesh.ratios[static_cast<std::size_t>(level - 1)]));
+      refuse(fmt::format("level {}, patch {}: the box {} does not align with the cells of level {} (refinement ratio {})", level,
+                         k, text(box), level - 1, mesh.ratios[static_cast<std::size_t>(level - 1)]));
   }
   for (std::size_t k = 0; k < list.size(); ++k)
     for (int other : patches_in(level, list[k].box))

@@ -48,7 +48,7 @@ struct LeafCell {
 struct FieldStatistics {
   double min = std::numeric_limits<double>::quiet_NaN();
   double max = std::numeric_limits<double>::quiet_NaN();
-  double least_magnitude = 0;  ///< smallest magnitude above 0; 0 where there is none
+  double least_magnitude = 0;            ///< smallest magnitude above 0; 0 where there is none
   double volume_integral = 0;            ///< sum of value times cell volume, world units
   std::int64_t cells_without_value = 0;  ///< leaf cells that hold NaN or an infinity
 };

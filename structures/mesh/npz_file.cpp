@@ -14,9 +14,9 @@
 namespace amrtex {
 namespace {
 
-constexpr zip_uint32_t kFast = 1;                   // a sweep waits for it
+constexpr zip_uint32_t kFast = 1;                 // a sweep waits for it
 constexpr std::uint64_t kMostCompression = 1100;  // deflate packs at most 1032 bytes into one
-constexpr std::size_t kNpyStartBytes = 10;         // magic, version, length of the header
+constexpr std::size_t kNpyStartBytes = 10;        // magic, version, length of the header
 const std::vector<std::string> kTypes = {"<f2", "<f4", "<f8", "<i4", "<i8", "|u1"};
 
 struct Discard {
@@ -200,7 +200,8 @@ NpyHeader NpzFile::header(const std::string& name) const {
 
 NpyArray NpzFile::read(const std::string& name) const {
   ArrayStream stream(data_->archive.get(), data_->find(name), data_->path, data_->in_file(name));
-  NpyArray array{stream.header().type, stream.header().shape, std::string(static_cast<std::size_t>(stream.header().value_bytes), '\0')};
+  NpyArray array{stream.header().type, stream.header().shape,
+                 std::string(static_cast<std::size_t>(stream.header().value_bytes), '\0')};
   stream.read(array.bytes.data(), array.bytes.size());
   stream.finish();
   return array;

@@ -53,14 +53,16 @@ class Mutator {
   }
   /// Four or eight bytes become a number that limits like to be.
   void replace_number(std::string& bytes, std::size_t at) {
-    constexpr std::array<std::int64_t, 10> kNumbers = {0, 1, -1, 127, 255, 65535, 0x7fffffff, -0x80000000LL, 0x7fffffffffffffff, 1000000};
+    constexpr std::array<std::int64_t, 10> kNumbers = {
+        0, 1, -1, 127, 255, 65535, 0x7fffffff, -0x80000000LL, 0x7fffffffffffffff, 1000000};
     const std::int64_t number = kNumbers[below(kNumbers.size())];
     const std::size_t length = std::min<std::size_t>(below(2) == 0 ? 4 : 8, bytes.size() - at);
     bytes.replace(at, length, reinterpret_cast<const char*>(&number), length);
   }
   /// A number in a text becomes another one.
   void replace_digits(std::string& bytes, std::size_t at) {
-    constexpr std::array<std::string_view, 8> kNumbers = {"0", "-1", "2147483647", "2147483648", "9223372036854775807", "1e308", "nan", "3"};
+    constexpr std::array<std::string_view, 8> kNumbers = {"0",     "-1",  "2147483647", "2147483648", "9223372036854775807",
+                                                          "1e308", "nan", "3"};
     const std::size_t first = bytes.find_first_of("0123456789", at);
     if (first == std::string::npos) return;
     const std::size_t end = std::min(bytes.find_first_not_of("0123456789.", first), bytes.size());

@@ -88,8 +88,8 @@ std::uint64_t locate_fab(FabSource& fab, const DataFile& file, const CellHeader&
     scan_fab_line(fab, file, offset, header);
   const auto range = fab_component_range(fab.values_begin, fab.stored.size(), components, 0, fab.format.bytes);
   if (!range || range->fab_end > file_size)
-    throw Error(fmt::format("{}: too short, {} bytes; patch {} {} of {} components needs {} from byte {} on", fab.file->path.string(),
-                            file_size, patch, text(fab.stored), components,
+    throw Error(fmt::format("{}: too short, {} bytes; patch {} {} of {} components needs {} from byte {} on",
+                            fab.file->path.string(), file_size, patch, text(fab.stored), components,
                             range ? fmt::format("{} bytes", range->fab_end - fab.values_begin) : "more than 2^63 bytes",
                             fab.values_begin));
   return range->fab_end - fab.values_begin;

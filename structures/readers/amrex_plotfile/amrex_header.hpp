@@ -28,8 +28,8 @@ struct PlotHeader {
   std::filesystem::path folder;
   std::vector<std::string> fields;
   int dimensions = 3;  ///< 2 or 3; along the third axis of 2, boxes have the one cell 0
-  Vec3d lower{0};  ///< world
-  Vec3d upper{1};  ///< world
+  Vec3d lower{0};      ///< world
+  Vec3d upper{1};      ///< world
   std::vector<IndexBox> domains;
   std::vector<int> ratios;
   std::vector<LevelEntry> levels;

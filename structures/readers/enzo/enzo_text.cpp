@@ -249,7 +249,8 @@ std::string enzo_unit(const EnzoParameters& parameters, const std::string& field
     if (label != field) continue;
     const auto unit = parameters.units.find(number);
     const auto factor = parameters.factors.find(number);
-    const bool said = unit != parameters.units.end() && unit->second != "none" && unit->second != "(none)" && is_utf8(unit->second);
+    const bool said =
+        unit != parameters.units.end() && unit->second != "none" && unit->second != "(none)" && is_utf8(unit->second);
     return said && (factor == parameters.factors.end() || factor->second == 1) ? unit->second : "";
   }
   return "";

@@ -16,8 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<ExaField> fields_to_read(const fs::path& path, const std::vector<ExaField>& all,
-                                     const FieldChoice& names) {
+std::vector<ExaField> fields_to_read(const fs::path& path, const std::vector<ExaField>& all, const FieldChoice& names) {
   std::vector<std::string> there;
   for (const ExaField& field : all) there.push_back(field.name);
   std::vector<ExaField> wanted;

@@ -185,7 +185,8 @@ void read_values(const ArrayReader& in, RealType type, std::size_t fields, std::
     }
   });
   for (std::size_t i = 0; i < wanted.size(); ++i)  // a field that is asked for twice
-    if (const auto first = std::find(wanted.begin(), wanted.end(), wanted[i]); first - wanted.begin() < static_cast<std::ptrdiff_t>(i))
+    if (const auto first = std::find(wanted.begin(), wanted.end(), wanted[i]);
+        first - wanted.begin() < static_cast<std::ptrdiff_t>(i))
       for (Patch* patch : patches) patch->values[i] = patch->values[static_cast<std::size_t>(first - wanted.begin())];
 }
 
@@ -231,7 +232,8 @@ Arrays frame_of(const AmrHierarchy& mesh) {
   const Vec3d upper = mesh.domain_upper();
   const std::string names = fmt::format("{}", fmt::join(mesh.fields(), "\n"));
   std::string units;
-  for (int field = 0; field < std::ssize(mesh.fields()); ++field) units += (field > 0 ? "\n" : "") + one_line_of(mesh.unit(field));
+  for (int field = 0; field < std::ssize(mesh.fields()); ++field)
+    units += (field > 0 ? "\n" : "") + one_line_of(mesh.unit(field));
   return {{"ratios", array_of<std::int32_t>("<i4", {std::ssize(ratios)}, ratios)},
           {"root_cells", array_of<std::int32_t>("<i4", {3}, {root.x, root.y, root.z})},
           {"domain", array_of<double>("<f8", {2, 3}, {lower.x, lower.y, lower.z, upper.x, upper.y, upper.z})},

@@ -46,7 +46,8 @@ VolumeFile describe(const fs::path& path) {
 }
 
 Volume load(const fs::path& path, const VolumeFile& file) {
-  return {dataset_name(path), file.field, file.cells, file.lower, file.spacing, load_values(file), real_type_of(file.type), file.unit};
+  return {dataset_name(path),      file.field, file.cells, file.lower, file.spacing, load_values(file),
+          real_type_of(file.type), file.unit};
 }
 
 }  // namespace

@@ -67,7 +67,8 @@ VtkLevel scan_level(const Hdf5File& file, std::string group) {
       box.lower[axis] = corners.values[i + 2 * static_cast<std::size_t>(axis)];
       box.upper[axis] = corners.values[i + 2 * static_cast<std::size_t>(axis) + 1];
       if (std::abs(box.lower[axis]) > kInt32Max || std::abs(box.upper[axis]) > kInt32Max || box.upper[axis] < box.lower[axis])
-        file.fail(set, fmt::format("box {} reaches from {} to {} along {}", i / 6, box.lower[axis], box.upper[axis], "xyz"[axis]));
+        file.fail(set,
+                  fmt::format("box {} reaches from {} to {} along {}", i / 6, box.lower[axis], box.upper[axis], "xyz"[axis]));
     }
     const Vec3l size = box.size();
     cells += CheckedSize(size.x) * size.y * size.z;
@@ -93,9 +94,10 @@ int ratio_between(const Hdf5File& file, const VtkLevel& coarse, const VtkLevel& 
   const double whole = std::round(ratio.x);
   for (int axis = 0; axis < 3; ++axis)
     if (!(whole >= 2 && whole <= 65536 && std::abs(ratio[axis] - whole) <= kRounding * whole))
-      file.fail(fine.group, fmt::format("its cells are {} as wide as those of {} along {}; the same whole ratio along all axes, 2 "
-                                        "or more, can be read",
-                                        1 / ratio[axis], coarse.group, "xyz"[axis]));
+      file.fail(fine.group,
+                fmt::format("its cells are {} as wide as those of {} along {}; the same whole ratio along all axes, 2 "
+                            "or more, can be read",
+                            1 / ratio[axis], coarse.group, "xyz"[axis]));
   return static_cast<int>(whole);
 }
 
@@ -114,7 +116,8 @@ IndexBox domain_of(const Hdf5File& file, const std::vector<VtkLevel>& levels, co
       }
   }
   if (domain.upper.x < domain.lower.x) file.fail(kRoot, "its levels hold no box");
-  if (glm::any(glm::greaterThan(domain.size(), Vec3l(kInt32Max)))) file.fail(kRoot, "its boxes reach over more than 31 bits of index");
+  if (glm::any(glm::greaterThan(domain.size(), Vec3l(kInt32Max))))
+    file.fail(kRoot, "its boxes reach over more than 31 bits of index");
   return domain;
 }
 
@@ -125,8 +128,7 @@ std::vector<std::string> scan_fields(const Hdf5File& file, const VtkLevel& level
   if (file.has(group))
     for (const std::string& name : file.members(group))
       if (file.rank_of_reals(fmt::format("{}/{}", group, name)) == 1) fields.push_back(name);
-  if (fields.empty())
-    file.fail(level.group, "it holds no array of one real a cell in CellData; values of points cannot be read");
+  if (fields.empty()) file.fail(level.group, "it holds no array of one real a cell in CellData; values of points cannot be read");
   return fields;
 }
 
@@ -138,21 +140,21 @@ Hdf5Numbers open_field(const Hdf5File& file, const VtkLevel& level, const std::s
   return values;
 }
 
-void read_level(const Hdf5File& file, const VtkLevel& level, const Vec3l& lower, MeshDescription& mesh, std::vector<Patch>& patches) {
+void read_level(const Hdf5File& file, const VtkLevel& level, const Vec3l& lower, MeshDescription& mesh,
+                std::vector<Patch>& patches) {
   std::vector<std::uint64_t> first;
   std::uint64_t cells = 0;
   for (const IndexBox& box : level.boxes) {
-    patches.push_back({{Vec3i(box.lower - lower), Vec3i(box.upper - lower + std::int64_t{1})},
-                       std::vector<CellValues>(mesh.fields.size())});
+    patches.push_back(
+        {{Vec3i(box.lower - lower), Vec3i(box.upper - lower + std::int64_t{1})}, std::vector<CellValues>(mesh.fields.size())});
     first.push_back(cells);
     cells += static_cast<std::uint64_t>(patches.back().box.cells());
   }
   for (std::size_t field = 0; field < mesh.fields.size() && !patches.empty(); ++field) {
     const Hdf5Numbers values = open_field(file, level, mesh.fields[field]);
     require_memory(file.path(), level.cells, 1, bytes_of(values.type()));
-    for_each_index(patches.size(), values.parallel(), [&](std::size_t k) {
-      patches[k].values[field] = values.read_box(first[k], patches[k].box, patches[k].box);
-    });
+    for_each_index(patches.size(), values.parallel(),
+                   [&](std::size_t k) { patches[k].values[field] = values.read_box(first[k], patches[k].box, patches[k].box); });
   }
 }
 
