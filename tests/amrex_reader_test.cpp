@@ -210,6 +210,7 @@ void expect_spec(const MeshDescription& mesh, const Spec& spec, const std::vecto
       for (std::size_t f = 0; f < fields.size(); ++f) {
         EXPECT_EQ(mesh.fields[f], spec.fields[fields[f]]);
         ASSERT_EQ(static_cast<std::int64_t>(patch.values[f].size()), patch.box.cells());
+        ASSERT_EQ(bytes_of(patch.values[f].type()), static_cast<std::size_t>(spec.format.bytes)) << "the type of the file";
         for_each_cell(patch.box, [&](const Vec3i& cell) {
           ASSERT_EQ(patch.values[f][patch.box.offset(cell)], value_at(l, fields[f], cell)) << "level " << l << ", patch " << k;
         });
@@ -516,7 +517,7 @@ std::vector<BadCase> bad_cases() {
       {"a field name too few",
        edits(h, "1\nphi", "2\nphi"),
        {"plt/Header, line 5", "the dimension behind the names of 2 fields"}},
-      {"two dimensions", edits(h, "phi\n3", "phi\n2"), {"plt/Header, line 4", "2-dimensional", "only 3-dimensional"}},
+      {"one dimension", edits(h, "phi\n3", "phi\n1"), {"plt/Header, line 4", "1-dimensional", "2 and 3 dimensions"}},
       {"too many levels", edits(h, "0.25\n1\n", "0.25\n64\n"), {"plt/Header, line 6", "from 0 to 63"}},
       {"upside-down domain", edits(h, "-1 0 0.5", "-1 3 0.5"), {"plt/Header, line 8", "upper corner"}},
       {"infinite domain", edits(h, "-1 0 0.5", "-inf 0 0.5"), {"plt/Header, line 7", "not finite"}},
@@ -670,9 +671,10 @@ MeshDescription mesh_with_missing_values(const fs::path& folder) {
   Spec spec = two_levels(4, Vec3i(-3, 0, 5));
   spec.fields = {"density", "velocity in x"};
   MeshDescription mesh = read_mesh(write_plotfile(folder, spec));
-  mesh.levels[0][0].values[0][0] = std::numeric_limits<double>::quiet_NaN();
-  mesh.levels[1][0].values[1][7] = std::numeric_limits<double>::infinity();
-  for (double& v : mesh.levels[0][1].values[1]) v = std::numeric_limits<double>::quiet_NaN();
+  mesh.levels[0][0].values[0].set(0, std::numeric_limits<double>::quiet_NaN());
+  mesh.levels[1][0].values[1].set(7, std::numeric_limits<double>::infinity());
+  CellValues& all = mesh.levels[0][1].values[1];
+  for (std::size_t i = 0; i < all.size(); ++i) all.set(i, std::numeric_limits<double>::quiet_NaN());
   return mesh;
 }
 
@@ -820,6 +822,59 @@ TEST_F(AmrexReader, DamagedFilesAreReadOrRefused) {
       write_text(file, text);
     }
   }
+}
+
+TEST_F(AmrexReader, WithoutANameReadsTheFirstFieldAndKnowsTheOthers) {
+  Spec spec = two_levels();
+  spec.fields = {"density", "velocity in x", "Y(O2)"};
+  const MeshDescription mesh = read_mesh(write_plotfile(folder_ / "plt", spec), FieldChoice::first());
+  expect_spec(mesh, spec, {0});
+  EXPECT_EQ(mesh.fields_there, spec.fields);
+}
+
+/// 4 x 2 cells, of which the two in the middle of the lower row are refined by 2. Values are x + 10 y of each level's cells.
+fs::path write_flat_plotfile(const fs::path& folder) {
+  const auto level = [&](int number, const Vec3i& lower, const Vec3i& size) {
+    const Vec3i upper = lower + size - 1;
+    const std::string box = fmt::format("(({},{}) ({},{}) (0,0))", lower.x, lower.y, upper.x, upper.y);
+    std::string data = fmt::format("FAB ((8, (32 8 23 0 1 9 0 127)),(4, (4 3 2 1))){} 1\n", box);
+    for (int y = lower.y; y <= upper.y; ++y)
+      for (int x = lower.x; x <= upper.x; ++x) data += encoded(x + 10 * y, {4, std::endian::little});
+    const fs::path where = folder / fmt::format("Level_{}", number);
+    fs::create_directories(where);
+    write_text(where / "Cell_D_00000", data);
+    write_text(where / "Cell_H",
+               fmt::format("1\n1\n1\n0\n(1 0\n{}\n)\n1\nFabOnDisk: Cell_D_00000 0\n\n1,1\n0,\n\n1,1\n9,\n\n", box));
+  };
+  level(0, Vec3i(0), Vec3i(4, 2, 1));
+  level(1, Vec3i(2, 0, 0), Vec3i(4, 2, 1));
+  write_text(folder / "Header",
+             "HyperCLaw-V1.1\n1\nphi\n2\n0.5\n1\n-1 0 \n1 1 \n2 \n((0,0) (3,1) (0,0)) ((0,0) (7,3) (0,0)) \n5 5 \n0.5 0.5 \n0.25 "
+             "0.25 \n0\n"
+             "0\n0 1 0.5\n5\n-1 1\n0 1\nLevel_0/Cell\n1 1 0.5\n5\n-0.5 0.5\n0 0.5\nLevel_1/Cell\n");
+  return folder;
+}
+
+TEST_F(AmrexReader, TwoDimensionsBecomeASlab) {
+  const MeshDescription mesh = read_mesh(write_flat_plotfile(folder_ / "plt"));
+  EXPECT_EQ(mesh.dimensions, 2);
+  EXPECT_EQ(mesh.ratios, std::vector<int>{2});
+  EXPECT_EQ(mesh.root_cells, Vec3i(4, 2, 1));
+  EXPECT_EQ(mesh.domain_upper - mesh.domain_lower, Vec3d(2, 1, 0.25)) << "as deep as the edge of a finest cell";
+  EXPECT_EQ(mesh.levels[1][0].box, (Box{Vec3i(2, 0, 0), Vec3i(6, 2, 2)}));
+  const AmrHierarchy h(mesh);
+  EXPECT_EQ(h.leaf_cells(0), 6);
+  EXPECT_EQ(h.leaf_cells(1), 16);
+  // the sums of the leaves' values, by the areas of their cells and the depth
+  const double coarse = (0 + 3 + 10 + 11 + 12 + 13) * 0.25;
+  const double fine = (2 * (2 + 3 + 4 + 5) + 4 * 10) * 0.0625;
+  EXPECT_NEAR(h.statistics(0).volume_integral, (coarse + fine) * 0.25, 1e-13);
+}
+
+TEST_F(AmrexReader, OneDimensionIsRefused) {
+  const fs::path plt = write_flat_plotfile(folder_ / "plt");
+  edit(plt / "Header", "phi\n2\n", "phi\n1\n");
+  EXPECT_THAT(message_of([&] { read_mesh(plt); }), testing::HasSubstr("1-dimensional; 2 and 3 dimensions can be read"));
 }
 
 }  // namespace

@@ -94,9 +94,9 @@ AmrHierarchy with_second_field(const MeshBuilder& builder, const Function& g) {
   mesh.fields.push_back("g");
   for (std::size_t level = 0; level < mesh.levels.size(); ++level)
     for (Patch& patch : mesh.levels[level]) {
-      patch.values.emplace_back();
-      for_each_cell(patch.box,
-                    [&](const Vec3i& c) { patch.values.back().push_back(g(builder.centre(static_cast<int>(level), c))); });
+      std::vector<double> values;
+      for_each_cell(patch.box, [&](const Vec3i& c) { values.push_back(g(builder.centre(static_cast<int>(level), c))); });
+      patch.values.emplace_back(values);
     }
   return AmrHierarchy(std::move(mesh));
 }

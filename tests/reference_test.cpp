@@ -45,11 +45,11 @@ MeshDescription domain(const Vec3i& root, std::vector<int> ratios, const Vec3d& 
 void add_patch(MeshDescription& mesh, int level, const Box& box, const Function& f) {
   Vec3d cells(mesh.root_cells);
   for (int l = 0; l < level; ++l) cells *= mesh.ratios[static_cast<std::size_t>(l)];
-  Patch patch{box, {{}}};
+  std::vector<double> values;
   for_each_cell(box, [&](const Vec3i& c) {
-    patch.values[0].push_back(f(mesh.domain_lower + (Vec3d(c) + 0.5) / cells * (mesh.domain_upper - mesh.domain_lower)));
+    values.push_back(f(mesh.domain_lower + (Vec3d(c) + 0.5) / cells * (mesh.domain_upper - mesh.domain_lower)));
   });
-  mesh.levels[static_cast<std::size_t>(level)].push_back(std::move(patch));
+  mesh.levels[static_cast<std::size_t>(level)].push_back({box, {CellValues(values)}});
 }
 
 /// What a file stores under finer patches must not matter.
@@ -549,7 +549,7 @@ TEST(ReferenceFilter, RefinedCellsTakeTheMeanOfTheirLeavesAlsoWhereNoPatchStores
       add_patch(mesh, 0, {Vec3i(0), {2, 1, 1}}, poison);
     else
       add_patch(mesh, 0, {{1, 0, 0}, {2, 1, 1}}, poison);
-    mesh.levels[0][0].values[0].back() = 100;
+    mesh.levels[0][0].values[0].set(mesh.levels[0][0].values[0].size() - 1, 100);
     // cell 0 holds six leaves of level 1 with value 2, one of NaN, and one refined into 8 of which one is infinite
     add_patch(mesh, 1, {Vec3i(0), Vec3i(2)}, [](const Vec3d& p) { return p.x < 0.25 && p.y < 0.5 && p.z < 0.5 ? kNan : 2.0; });
     double next = 0;

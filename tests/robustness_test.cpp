@@ -243,7 +243,7 @@ MeshDescription description(const Vec3i& root, std::vector<int> ratios) {
   mesh.fields = {"f"};
   return mesh;
 }
-Patch patch(const Box& box) { return {box, {std::vector<double>(static_cast<std::size_t>(box.cells()), 1.0)}}; }
+Patch patch(const Box& box) { return {box, {CellValues(std::vector<double>(static_cast<std::size_t>(box.cells()), 1.0))}}; }
 
 TEST(Meshes, OfTwoCellsInTheLargestDomainAreRead) {
   constexpr int kEdge = std::numeric_limits<int>::max() - 4096;

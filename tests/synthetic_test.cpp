@@ -50,8 +50,8 @@ bool same_bytes(const MeshDescription& a, const MeshDescription& b) {
       const Patch& y = b.levels[l][p];
       if (!(x.box == y.box) || x.values.size() != y.values.size()) return false;
       for (std::size_t f = 0; f < x.values.size(); ++f)
-        if (x.values[f].size() != y.values[f].size() ||
-            std::memcmp(x.values[f].data(), y.values[f].data(), x.values[f].size() * sizeof(double)) != 0)
+        if (const auto one = x.values[f].doubles(), other = y.values[f].doubles();
+            one.size() != other.size() || std::memcmp(one.data(), other.data(), one.size() * sizeof(double)) != 0)
           return false;
     }
   }

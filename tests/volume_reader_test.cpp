@@ -83,6 +83,17 @@ class VolumeReader : public FolderTest {
   }
 };
 
+TEST_F(VolumeReader, KeepsNarrowNumbersAsFloatsAndSaysTheirUnit) {
+  const std::string bytes = bytes_of_values(counted<std::int16_t>());
+  const std::string fields = std::string("type: short\nencoding: raw\nendian: little\n") + kShape;
+  const MeshDescription mesh = read_mesh(write("a.nrrd", nrrd(fields + "sample units: \"K\"\n", bytes)));
+  EXPECT_EQ(mesh.units, std::vector<std::string>{"K"});
+  EXPECT_EQ(mesh.levels.back()[0].values[0].type(), RealType::float32);
+  EXPECT_EQ(read_mesh(write("b.nrrd", nrrd(fields, bytes))).units, std::vector<std::string>{""});
+  expect_raw<double>("float64");
+  EXPECT_EQ(read_mesh(at("head_4x3x2_float64.raw")).levels.back()[0].values[0].type(), RealType::float64);
+}
+
 TEST_F(VolumeReader, RawFilesSayTheirShapeAndTypeInTheirNames) {
   expect_raw<std::uint8_t>("uint8");
   expect_raw<std::int8_t>("int8");

@@ -58,7 +58,7 @@ class Folder {
 /// A file that cannot be read is bad usage here: there is nothing to advise on.
 AmrHierarchy read_data(const Arguments& a) {
   try {
-    return AmrHierarchy(read_mesh(a.data, a.field.empty() ? std::vector<std::string>() : std::vector{a.field}));
+    return AmrHierarchy(read_mesh(a.data, FieldChoice::one(a.field)));
   } catch (const BudgetError&) {
     throw;
   } catch (const Error& e) {

@@ -57,11 +57,18 @@ std::vector<PngColor> bar_colors(const Scene& scene, const ColorPoints& map) {
   return colors;
 }
 
+/// With the unit where the file says it.
+std::string named_with_unit(const AmrHierarchy& mesh, int field) {
+  const std::string& unit = mesh.unit(field);
+  return mesh.fields()[static_cast<std::size_t>(field)] + (unit.empty() ? "" : " [" + unit + "]");
+}
+
 std::string bar_title(const Scene& scene, const AmrHierarchy& mesh) {
   const Isosurfaces& iso = scene.settings.isosurfaces;
   if (scene.settings.draws_surfaces() && iso.output == Output::depth) return "distance";
-  if (scene.settings.mode == Mode::iso && !iso.color_field.empty()) return iso.color_field;
-  return mesh.fields().front() + (scene.settings.mode == Mode::projection ? " x length" : "");
+  if (scene.settings.mode == Mode::iso && !iso.color_field.empty())
+    return named_with_unit(mesh, mesh.field_index(iso.color_field));
+  return named_with_unit(mesh, 0) + (scene.settings.mode == Mode::projection ? " x length" : "");
 }
 
 /// Raw values of rays that pass the domain are none, rather than 0: what lies around it is background.

@@ -87,7 +87,7 @@ std::vector<Sampled> sample(const Arguments& a) {
   request.parameters = complete_parameters(encoding, parse_parameters(a.parameters));
   const ContextKind kind = parse_context_kind(a.context);
   const std::vector<Vec3d> points = read_points(a.points);
-  const AmrHierarchy mesh(read_mesh(a.data, a.field.empty() ? std::vector<std::string>() : std::vector{a.field}));
+  const AmrHierarchy mesh(read_mesh(a.data, FieldChoice::one(a.field)));
   const auto context = make_context(kind);
   request.context = context->info();
   require_support(encoding, request.context);

@@ -48,7 +48,7 @@ Shown build(const Arguments& a) {
   const Sampling sampling = parse_sampling(a.sampling);
   if (!(a.step > 0) || !std::isfinite(a.step))
     throw UsageError(fmt::format("--step {}; accepted: a number above 0, in cell widths", a.step));
-  AmrHierarchy mesh(read_mesh(a.data, a.field.empty() ? std::vector<std::string>() : std::vector{a.field}));
+  AmrHierarchy mesh(read_mesh(a.data, FieldChoice::one(a.field)));
   EncodedField field = encoding.build(mesh, request);
   std::vector<FieldRegion> regions = list_regions(mesh, field);
   std::optional<std::vector<SamplePlace>> samples;

@@ -138,7 +138,7 @@ void add_scene_arguments(CLI::App& c, SceneArguments& a) {
 }
 
 AmrHierarchy read_data_set(const std::string& data, const std::string& field) {
-  return AmrHierarchy(read_mesh(data, field.empty() ? std::vector<std::string>() : std::vector{field}));
+  return AmrHierarchy(read_mesh(data, FieldChoice::one(field)));
 }
 
 }  // namespace amrtex

@@ -14,17 +14,16 @@ namespace amrtex {
 
 AmrHierarchy load_dataset(const Experiment& experiment, const DatasetSource& source) {
   if (!source.file) return AmrHierarchy(generate_mesh(source.generate));
-  std::vector<std::string> fields;  // empty: all of them
-  if (source.field) {
-    const auto need = [&](const std::string& name) {
-      if (!name.empty() && std::find(fields.begin(), fields.end(), name) == fields.end()) fields.push_back(name);
-    };
-    need(*source.field);
-    for (const RenderPoint& render : experiment.renders) {
-      need(render.settings.isosurfaces.color_field);
-      for (const FieldTransfer& other : render.more_fields) need(other.field);
-    }
+  std::vector<std::string> fields;
+  const auto need = [&](const std::string& name) {
+    if (!name.empty() && std::find(fields.begin(), fields.end(), name) == fields.end()) fields.push_back(name);
+  };
+  if (source.field) need(*source.field);
+  for (const RenderPoint& render : experiment.renders) {
+    need(render.settings.isosurfaces.color_field);
+    for (const FieldTransfer& other : render.more_fields) need(other.field);
   }
+  if (!source.field) return AmrHierarchy(read_mesh(*source.file, fields.empty() ? FieldChoice::first() : FieldChoice()));
   return AmrHierarchy(read_mesh(*source.file, fields));
 }
 

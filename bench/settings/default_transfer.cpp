@@ -178,7 +178,8 @@ std::vector<Vec3d> some_cells(const AmrHierarchy& mesh, int field, Wanted&& want
       const auto& values = patches[p].values[static_cast<std::size_t>(field)];
       const Vec3i size = patches[p].box.size();
       for (std::size_t i = 0; i < values.size(); ++i) {
-        if (leaf[i] == 0 || !std::isfinite(values[i]) || !wanted(values[i]) || seen++ % stride != 0) continue;
+        const double value = leaf[i] == 0 ? std::numeric_limits<double>::quiet_NaN() : values[i];
+        if (!std::isfinite(value) || !wanted(value) || seen++ % stride != 0) continue;
         const auto n = static_cast<std::int64_t>(i);
         const Vec3i cell(n % size.x, n / size.x % size.y, n / size.x / size.y);
         places.push_back(mesh.domain_lower() + (Vec3d(patches[p].box.lower + cell) + 0.5) * mesh.spacing(level));

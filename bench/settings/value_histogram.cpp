@@ -27,9 +27,10 @@ void for_each_value(const AmrHierarchy& mesh, int field, Visit&& visit) {
     const auto patches = mesh.patches(level);
     for (std::size_t p = 0; p < patches.size(); ++p) {
       const auto leaf = mesh.leaf_mask(level, static_cast<int>(p));
-      const std::vector<double>& values = patches[p].values[static_cast<std::size_t>(field)];
-      for (std::size_t i = 0; i < values.size(); ++i)
-        if (leaf[i] != 0 && std::isfinite(values[i])) visit(values[i], level);
+      patches[p].values[static_cast<std::size_t>(field)].visit([&](const auto& values) {
+        for (std::size_t i = 0; i < leaf.size(); ++i)
+          if (leaf[i] != 0 && std::isfinite(values[i])) visit(values[i], level);
+      });
     }
   }
 }

@@ -122,7 +122,7 @@ void deep_hits(VerifyContext& v, const std::string& name, const AmrHierarchy& h)
     marked.levels.emplace_back();
     for (const Patch& p : h.patches(l)) {
       const double value = l == finest_level ? 1 : 0;
-      marked.levels.back().push_back({p.box, {std::vector<double>(static_cast<std::size_t>(p.box.cells()), value)}});
+      marked.levels.back().push_back({p.box, {CellValues(std::vector<double>(static_cast<std::size_t>(p.box.cells()), value))}});
     }
   }
   const AmrHierarchy mesh(marked);

@@ -43,14 +43,13 @@ class MeshBuilder {
   }
 
   MeshBuilder& patch(int level, const Box& box, const Function& f) {
-    Patch patch{box, {{}}};
-    for_each_cell(box, [&](const Vec3i& c) { patch.values[0].push_back(f(centre(level, c))); });
-    mesh_.levels[static_cast<std::size_t>(level)].push_back(std::move(patch));
-    return *this;
+    std::vector<double> values;
+    for_each_cell(box, [&](const Vec3i& c) { values.push_back(f(centre(level, c))); });
+    return patch(level, box, values);
   }
   /// Values as given, x fastest.
-  MeshBuilder& patch(int level, const Box& box, std::vector<double> values) {
-    mesh_.levels[static_cast<std::size_t>(level)].push_back({box, {std::move(values)}});
+  MeshBuilder& patch(int level, const Box& box, const std::vector<double>& values) {
+    mesh_.levels[static_cast<std::size_t>(level)].push_back({box, {CellValues(values)}});
     return *this;
   }
   /// A further field over the patches so far.
@@ -58,8 +57,9 @@ class MeshBuilder {
     mesh_.fields.push_back(name);
     for (std::size_t level = 0; level < mesh_.levels.size(); ++level)
       for (Patch& patch : mesh_.levels[level]) {
-        std::vector<double>& values = patch.values.emplace_back();
+        std::vector<double> values;
         for_each_cell(patch.box, [&](const Vec3i& c) { values.push_back(f(centre(static_cast<int>(level), c))); });
+        patch.values.emplace_back(values);
       }
     return *this;
   }

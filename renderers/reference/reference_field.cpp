@@ -26,15 +26,16 @@ ReferenceField::ReferenceField(const AmrHierarchy& hierarchy, int field)
     const auto patches = hierarchy.patches(l);
     level.patches.resize(patches.size());
     tbb::parallel_for(std::size_t{0}, patches.size(), [&](std::size_t k) {
-      const auto& values = patches[k].values[static_cast<std::size_t>(field)];
+      const CellValues& values = patches[k].values[static_cast<std::size_t>(field)];
       PatchView& view = level.patches[k];
-      view = {patches[k].box, values.data(), hierarchy.leaf_mask(l, static_cast<int>(k)).data(), {}, {}, {}};
-      if (!units_.plain()) {
-        for (const double v : values) view.numbers.push_back(units_.number(v));
-        view.values = view.numbers.data();
-      }
-      for (std::size_t i = 0; i < values.size(); ++i)
-        if (view.leaf[i] != 0 && !std::isfinite(values[i])) missing = true;
+      view = {patches[k].box, &values, hierarchy.leaf_mask(l, static_cast<int>(k)).data(), {}, {}, {}};
+      values.visit([&](const auto& all) {
+        const std::size_t n = values.size();
+        if (!units_.plain()) view.numbers.reserve(n);
+        for (std::size_t i = 0; i < n && !units_.plain(); ++i) view.numbers.push_back(units_.number(all[i]));
+        for (std::size_t i = 0; i < n; ++i)
+          if (view.leaf[i] != 0 && !std::isfinite(all[i])) missing = true;
+      });
       restrict_patch(l, view);
     });
     find_unstored(l);
@@ -43,7 +44,7 @@ ReferenceField::ReferenceField(const AmrHierarchy& hierarchy, int field)
 }
 
 double ReferenceField::stored_value(const PatchView& patch, std::size_t offset) {
-  const double v = patch.means.empty() ? patch.values[offset] : patch.means[offset];
+  const double v = patch.means.empty() ? patch.value(offset) : patch.means[offset];
   return std::isfinite(v) ? v : kNone;
 }
 
@@ -78,7 +79,7 @@ ReferenceField::Mean ReferenceField::mean_of_children(int level, const Vec3i& ce
 void ReferenceField::restrict_patch(int level, PatchView& patch) const {
   const auto n = static_cast<std::size_t>(patch.box.cells());
   if (std::find(patch.leaf, patch.leaf + n, std::uint8_t{0}) == patch.leaf + n) return;
-  patch.means.assign(patch.values, patch.values + n);
+  patch.means = patch.numbers.empty() ? patch.values->doubles() : patch.numbers;
   std::size_t i = 0;
   for_each_cell(patch.box, [&](const Vec3i& cell) {
     if (patch.leaf[i] == 0) {
@@ -107,7 +108,7 @@ void ReferenceField::find_unstored(int level) {
 ReferenceLeaf ReferenceField::find_leaf(const Vec3i& finest_cell, const ReferenceLeaf& hint) const {
   const auto in_patch = [&](int level, int k, const Vec3i& cell) {
     const PatchView& patch = at(level).patches[static_cast<std::size_t>(k)];
-    const double v = patch.values[patch.box.offset(cell)];
+    const double v = patch.value(patch.box.offset(cell));
     return ReferenceLeaf{level, k, cell, std::isfinite(v) ? v : kNone};
   };
   if (hint.level >= 0) {

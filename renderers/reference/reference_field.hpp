@@ -76,11 +76,13 @@ class ReferenceField {
   };
   struct PatchView {
     Box box;
-    const double* values;  // the file's, or `numbers`
+    const CellValues* values;  // the file's
     const std::uint8_t* leaf;
     std::vector<double> numbers;  // where the units are not plain; else empty
     std::vector<double> means;    // v_L, where the patch has refined cells; else empty
     std::vector<double> shares;   // where they are not all 1; else empty
+
+    double value(std::size_t offset) const { return numbers.empty() ? (*values)[offset] : numbers[offset]; }
   };
   struct Level {
     int width;

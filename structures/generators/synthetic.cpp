@@ -210,8 +210,8 @@ class ValueSource {
       : keys_(keys), field_(field), missing_seed_(keys.seed + index) {}
 
   /// Of the cells of a box, level space.
-  std::vector<double> values(int level, const Box& box) const {
-    std::vector<double> result(static_cast<std::size_t>(box.cells()));
+  CellArray<double> values(int level, const Box& box) const {
+    CellArray<double> result(static_cast<std::size_t>(box.cells()));
     tbb::parallel_for(box.lower.z, box.upper.z, [&](int z) {
       const Box slab{{box.lower.x, box.lower.y, z}, {box.upper.x, box.upper.y, z + 1}};
       for_each_cell(slab, [&](const Vec3i& cell) { result[box.offset(cell)] = cell_value(level, cell); });
@@ -242,7 +242,7 @@ class ValueSource {
     return sum;
   }
 
-  void remove_values(int level, const Box& box, std::vector<double>& values) const {
+  void remove_values(int level, const Box& box, CellArray<double>& values) const {
     for_each_cell(box, [&](const Vec3i& cell) {
       if (cell_random(missing_seed_, kMissingStream, level, cell) < keys_.nan_fraction)
         values[box.offset(cell)] = std::numeric_limits<double>::quiet_NaN();

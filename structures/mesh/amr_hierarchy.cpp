@@ -91,6 +91,33 @@ struct Mean {
   double weight = 0;  ///< share of the cell that has a value, summed over what was added
 };
 
+/// A compensated sum: it holds to 1e-12 over millions of cells.
+struct LongSum {
+  double sum = 0;
+  double lost = 0;
+
+  void add(double v) {
+    const double y = v - lost;
+    const double t = sum + y;
+    lost = (t - sum) - y;
+    sum = t;
+  }
+};
+
+void add(FieldStatistics& s, double v) {
+  s.min = std::isnan(s.min) ? v : std::min(s.min, v);
+  s.max = std::isnan(s.max) ? v : std::max(s.max, v);
+  if (v != 0) s.least_magnitude = s.least_magnitude > 0 ? std::min(s.least_magnitude, std::abs(v)) : std::abs(v);
+}
+
+void merge(FieldStatistics& into, const FieldStatistics& s) {
+  into.cells_without_value += s.cells_without_value;
+  if (std::isnan(s.min)) return;
+  add(into, s.min);
+  add(into, s.max);
+  if (s.least_magnitude > 0) into.least_magnitude = std::min(into.least_magnitude, s.least_magnitude);
+}
+
 }  // namespace
 
 struct AmrHierarchy::Data {
@@ -98,7 +125,8 @@ struct AmrHierarchy::Data {
   std::vector<Vec3i> cells;                                  // a level
   std::vector<int> width;                                    // a level, in finest cells
   std::vector<PatchIndex> index;                             // a level
-  std::vector<std::vector<std::vector<std::uint8_t>>> leaf;  // level, patch, cell
+  std::vector<std::vector<std::vector<std::uint8_t>>> leaf;  // level, patch, cell; of a patch of leaves alone: nothing
+  std::vector<std::uint8_t> ones;                            // the mask of all patches of leaves alone
   // level, patch, field, cell: share of a refined cell that has a value; only where it is not 0 or 1 for some cell
   std::vector<std::vector<std::vector<std::vector<double>>>> weight;
   std::vector<std::int64_t> leaves;  // a level
@@ -108,6 +136,11 @@ struct AmrHierarchy::Data {
   int levels() const { return static_cast<int>(mesh.levels.size()); }
   const std::vector<Patch>& patches(int level) const { return mesh.levels[static_cast<std::size_t>(level)]; }
   std::vector<Patch>& patches(int level) { return mesh.levels[static_cast<std::size_t>(level)]; }
+  std::span<const std::uint8_t> mask(int level, std::size_t k) const {
+    const auto& own = leaf[static_cast<std::size_t>(level)][k];
+    if (!own.empty()) return own;
+    return {ones.data(), static_cast<std::size_t>(patches(level)[k].box.cells())};
+  }
   const PatchIndex& at(int level) const { return index[static_cast<std::size_t>(level)]; }
   int width_of(int level) const { return width[static_cast<std::size_t>(level)]; }
   /// Cells of `fine` a cell of `coarse`, along an axis.
@@ -132,14 +165,18 @@ struct AmrHierarchy::Data {
   void check_patches(int level) const;
   bool cuts_stored_cell(int level, const Box& box) const;
   void mark_leaves(int level);
+  void mark_all_leaves();
   std::string mark_patch(int level, std::size_t patch);
   bool covered(int level, const Box& box) const;
   void restrict_level(int level);
-  void restrict_patch(int level, std::size_t patch, std::size_t field);
+  void restrict_patch(int level, std::size_t patch, std::size_t field, const std::shared_ptr<const CellSet>& refined);
   Mean mean_of_leaves(int level, const Vec3i& cell, std::size_t field) const;
   void drop_non_finite();
   void count();
   FieldStatistics measure(std::size_t field) const;
+  template <class F>
+  void for_leaves(int level, std::size_t patch, std::size_t field, F&& f) const;
+  Vec3i lower_corner(int finest) const;
 };
 
 void AmrHierarchy::Data::check_levels() {
@@ -198,8 +235,8 @@ void AmrHierarchy::Data::check_patches(int level) const {
       if (static_cast<std::int64_t>(values.size()) != box.cells())
         refuse(fmt::format("level {}, patch {}: {} values for {} cells", level, k, values.size(), box.cells()));
     if (level > 0 && cuts_stored_cell(level, box))
-      refuse(fmt::format("level {}, patch {}: the box {} does not align with the cells of level {} (refinement ratio {})", level, k,
-                         text(box), level - 1, mesh.ratios[static_cast<std::size_t>(level - 1)]));
+      refuse(fmt::format("level {}, patch {}: the box {} does not align with the cells of level {} (refinement ratio {})", level,
+                         k, text(box), level - 1, mesh.ratios[static_cast<std::size_t>(level - 1)]));
   }
   for (std::size_t k = 0; k < list.size(); ++k)
     for (int other : patches_in(level, list[k].box))
@@ -238,13 +275,13 @@ bool AmrHierarchy::Data::covered(int level, const Box& box) const {
 std::string AmrHierarchy::Data::mark_patch(int level, std::size_t k) {
   const Box& box = patches(level)[k].box;
   auto& mask = leaf[static_cast<std::size_t>(level)][k];
-  mask.assign(static_cast<std::size_t>(box.cells()), 1);
   for (int finer = level + 1; finer < levels(); ++finer) {
     const int r = ratio(level, finer);
     for (int other : patches_in(finer, box.refined(r))) {
       const Box& fine = patches(finer)[static_cast<std::size_t>(other)].box;
       const Box over = fine.coarsened(r);
       const bool aligned = over.refined(r) == fine;
+      if (mask.empty()) mask.assign(static_cast<std::size_t>(box.cells()), 1);
       const auto cut = first_cell(intersection(over, box), [&](const Vec3i& cell) {
         std::uint8_t& is_leaf = mask[box.offset(cell)];
         const Box all{cell, cell + Vec3i(1)};
@@ -277,12 +314,25 @@ void AmrHierarchy::Data::mark_leaves(int level) {
   if (first < masks.size()) refuse(problems[first]);
 }
 
+void AmrHierarchy::Data::mark_all_leaves() {
+  leaf.resize(mesh.levels.size());
+  for (int l = 0; l < levels(); ++l) mark_leaves(l);
+  std::int64_t most = 0;
+  for (int l = 0; l < levels(); ++l)
+    for (std::size_t k = 0; k < patches(l).size(); ++k)
+      if (leaf[static_cast<std::size_t>(l)][k].empty()) most = std::max(most, patches(l)[k].box.cells());
+  ones.assign(static_cast<std::size_t>(most), 1);
+}
+
 void AmrHierarchy::Data::drop_non_finite() {
   for (auto& level : mesh.levels)
-    for (Patch& patch : level)
-      for (auto& values : patch.values)
-        for (double& v : values)
-          if (!std::isfinite(v)) v = std::numeric_limits<double>::quiet_NaN();
+    tbb::parallel_for(std::size_t{0}, level.size(), [&](std::size_t k) {
+      for (CellValues& values : level[k].values)
+        values.visit_stored([](auto& stored) {
+          for (auto& v : stored)
+            if (!std::isfinite(v)) v = std::numeric_limits<std::decay_t<decltype(v)>>::quiet_NaN();
+        });
+    });
 }
 
 Mean AmrHierarchy::Data::mean_of_leaves(int level, const Vec3i& cell, std::size_t field) const {
@@ -293,28 +343,32 @@ Mean AmrHierarchy::Data::mean_of_leaves(int level, const Vec3i& cell, std::size_
     const Box inside = Box{cell, cell + Vec3i(1)}.refined(r);
     for (int k : patches_in(finer, inside)) {
       const Patch& patch = patches(finer)[static_cast<std::size_t>(k)];
-      const auto& mask = leaf[static_cast<std::size_t>(finer)][static_cast<std::size_t>(k)];
-      for_each_cell(intersection(patch.box, inside), [&](const Vec3i& c) {
-        const std::size_t i = patch.box.offset(c);
-        const double v = patch.values[field][i];
-        if (mask[i] == 0 || std::isnan(v)) return;
-        mean.sum += v * share;
-        mean.weight += share;
+      const auto is_leaf = mask(finer, static_cast<std::size_t>(k));
+      patch.values[field].visit([&](const auto& values) {
+        for_each_cell(intersection(patch.box, inside), [&](const Vec3i& c) {
+          const std::size_t i = patch.box.offset(c);
+          const double v = values[i];
+          if (is_leaf[i] == 0 || std::isnan(v)) return;
+          mean.sum += v * share;
+          mean.weight += share;
+        });
       });
     }
   }
   return mean;
 }
 
-void AmrHierarchy::Data::restrict_patch(int level, std::size_t k, std::size_t field) {
+void AmrHierarchy::Data::restrict_patch(int level, std::size_t k, std::size_t field,
+                                        const std::shared_ptr<const CellSet>& refined) {
   Patch& patch = patches(level)[k];
-  const auto& mask = leaf[static_cast<std::size_t>(level)][k];
-  auto& values = patch.values[field];
+  const auto is_leaf = mask(level, k);
+  CellValues& values = patch.values[field];
+  values.hold_means(refined);
   std::vector<double> shares;
   const int r = ratio(level, level + 1);
   const double share = 1.0 / (static_cast<double>(r) * r * r);
   const auto put = [&](std::size_t i, const Mean& mean) {
-    values[i] = mean.weight > 0 ? mean.sum / mean.weight : std::numeric_limits<double>::quiet_NaN();
+    values.set_mean(i, mean.weight > 0 ? mean.sum / mean.weight : std::numeric_limits<double>::quiet_NaN());
     if (mean.weight > 0 && mean.weight < 1 - 1e-9) {
       if (shares.empty()) shares.assign(values.size(), 1.0);
       shares[i] = mean.weight;
@@ -323,35 +377,39 @@ void AmrHierarchy::Data::restrict_patch(int level, std::size_t k, std::size_t fi
   std::vector<std::uint8_t> done;
   for (int other : patches_in(level + 1, patch.box.refined(r))) {
     const Patch& fine = patches(level + 1)[static_cast<std::size_t>(other)];
-    const auto& fine_values = fine.values[field];
     const auto& fine_shares = weight[static_cast<std::size_t>(level) + 1][static_cast<std::size_t>(other)][field];
     if (done.empty()) done.assign(values.size(), 0);
-    for_each_cell(intersection(fine.box.coarsened(r), patch.box), [&](const Vec3i& cell) {
-      Mean mean;
-      for_each_cell(Box{cell, cell + Vec3i(1)}.refined(r), [&](const Vec3i& child) {
-        const std::size_t j = fine.box.offset(child);
-        if (std::isnan(fine_values[j])) return;
-        const double w = fine_shares.empty() ? share : share * fine_shares[j];
-        mean.sum += fine_values[j] * w;
-        mean.weight += w;
+    fine.values[field].visit([&](const auto& fine_values) {
+      for_each_cell(intersection(fine.box.coarsened(r), patch.box), [&](const Vec3i& cell) {
+        Mean mean;
+        for_each_cell(Box{cell, cell + Vec3i(1)}.refined(r), [&](const Vec3i& child) {
+          const std::size_t j = fine.box.offset(child);
+          const double v = fine_values[j];
+          if (std::isnan(v)) return;
+          const double w = fine_shares.empty() ? share : share * fine_shares[j];
+          mean.sum += v * w;
+          mean.weight += w;
+        });
+        done[patch.box.offset(cell)] = 1;
+        put(patch.box.offset(cell), mean);
       });
-      done[patch.box.offset(cell)] = 1;
-      put(patch.box.offset(cell), mean);
     });
   }
   // what is refined by levels further down only
   for_each_cell(patch.box, [&](const Vec3i& cell) {
     const std::size_t i = patch.box.offset(cell);
-    if (mask[i] == 0 && (done.empty() || done[i] == 0)) put(i, mean_of_leaves(level, cell, field));
+    if (is_leaf[i] == 0 && (done.empty() || done[i] == 0)) put(i, mean_of_leaves(level, cell, field));
   });
   weight[static_cast<std::size_t>(level)][k][field] = std::move(shares);
 }
 
 void AmrHierarchy::Data::restrict_level(int level) {
   weight[static_cast<std::size_t>(level)].assign(patches(level).size(), std::vector<std::vector<double>>(mesh.fields.size()));
-  if (level + 1 == levels()) return;
   tbb::parallel_for(std::size_t{0}, patches(level).size(), [&](std::size_t k) {
-    for (std::size_t field = 0; field < mesh.fields.size(); ++field) restrict_patch(level, k, field);
+    const auto& own = leaf[static_cast<std::size_t>(level)][k];
+    if (own.empty()) return;
+    const auto refined = std::make_shared<const CellSet>(own);
+    for (std::size_t field = 0; field < mesh.fields.size(); ++field) restrict_patch(level, k, field, refined);
   });
 }
 
@@ -359,61 +417,73 @@ void AmrHierarchy::Data::count() {
   leaves.assign(mesh.levels.size(), 0);
   double covered = 0;  // of the domain, in finest cells
   for (std::size_t l = 0; l < mesh.levels.size(); ++l) {
-    for (const auto& mask : leaf[l])
-      for (std::uint8_t m : mask) leaves[l] += m;
+    for (std::size_t k = 0; k < leaf[l].size(); ++k) {
+      const auto& own = leaf[l][k];
+      leaves[l] += own.empty() ? mesh.levels[l][k].box.cells() : std::count(own.begin(), own.end(), std::uint8_t{1});
+    }
     covered += static_cast<double>(leaves[l]) * std::pow(static_cast<double>(width[l]), 3);
   }
   const Vec3d finest(cells.back());
   holes = covered < finest.x * finest.y * finest.z * (1 - 1e-14);
 }
 
+/// Calls f(offset in the patch, value) for each leaf of a patch.
+template <class F>
+void AmrHierarchy::Data::for_leaves(int level, std::size_t k, std::size_t field, F&& f) const {
+  const CellValues& values = patches(level)[k].values[field];
+  const auto is_leaf = mask(level, k);
+  values.visit([&](const auto& view) {
+    for (std::size_t i = 0; i < is_leaf.size(); ++i)
+      if (is_leaf[i] != 0) f(i, view[i]);
+  });
+}
+
 FieldStatistics AmrHierarchy::Data::measure(std::size_t field) const {
-  FieldStatistics s;
-  double integral = 0;
-  double lost = 0;  // compensated: sums hold to 1e-12 over millions of cells
-  for (std::size_t l = 0; l < mesh.levels.size(); ++l) {
-    const Vec3d h = (mesh.domain_upper - mesh.domain_lower) / Vec3d(cells[l]);
-    double sum = 0;
-    double comp = 0;
-    for (std::size_t k = 0; k < mesh.levels[l].size(); ++k) {
-      const auto& values = mesh.levels[l][k].values[field];
-      for (std::size_t i = 0; i < values.size(); ++i) {
-        if (leaf[l][k][i] == 0) continue;
-        const double v = values[i];
+  FieldStatistics all;
+  LongSum integral;
+  for (int l = 0; l < levels(); ++l) {
+    const Vec3d h = (mesh.domain_upper - mesh.domain_lower) / Vec3d(cells[static_cast<std::size_t>(l)]);
+    std::vector<FieldStatistics> of_patch(patches(l).size());
+    std::vector<LongSum> sums(patches(l).size());
+    tbb::parallel_for(std::size_t{0}, patches(l).size(), [&](std::size_t k) {
+      FieldStatistics s;
+      LongSum sum;
+      for_leaves(l, k, field, [&](std::size_t, double v) {
         if (std::isnan(v)) {
           ++s.cells_without_value;
-          continue;
+          return;
         }
-        s.min = std::isnan(s.min) ? v : std::min(s.min, v);
-        s.max = std::isnan(s.max) ? v : std::max(s.max, v);
-        if (v != 0) s.least_magnitude = s.least_magnitude > 0 ? std::min(s.least_magnitude, std::abs(v)) : std::abs(v);
-        const double y = v - comp;
-        const double t = sum + y;
-        comp = (t - sum) - y;
-        sum = t;
-      }
+        add(s, v);
+        sum.add(v);
+      });
+      of_patch[k] = s;
+      sums[k] = sum;
+    });
+    LongSum sum;
+    for (std::size_t k = 0; k < sums.size(); ++k) {
+      merge(all, of_patch[k]);
+      sum.add(sums[k].sum);
+      sum.add(-sums[k].lost);
     }
-    const double y = sum * (h.x * h.y * h.z) - lost;
-    const double t = integral + y;
-    lost = (t - integral) - y;
-    integral = t;
+    integral.add(sum.sum * (h.x * h.y * h.z));
   }
-  s.volume_integral = integral;
-  return s;
+  all.volume_integral = integral.sum;
+  return all;
 }
 
 AmrHierarchy::AmrHierarchy(MeshDescription description) : data_(std::make_unique<Data>()) {
   Data& d = *data_;
   d.mesh = std::move(description);
+  d.mesh.units.resize(d.mesh.fields.size());
+  if (d.mesh.fields_there.empty()) d.mesh.fields_there = d.mesh.fields;
   d.check_levels();
   for (const auto& level : d.mesh.levels) d.index.emplace_back(level);
   for (int l = 0; l < d.levels(); ++l) d.check_patches(l);
   std::int64_t stored = 0;
   for (int l = 0; l < d.levels(); ++l) stored += stored_cells(l);
   if (stored == 0) d.refuse("no cell");
-  d.leaf.resize(d.mesh.levels.size());
   d.weight.resize(d.mesh.levels.size());
-  for (int l = 0; l < d.levels(); ++l) d.mark_leaves(l);
+  d.mark_all_leaves();
   d.drop_non_finite();
   for (int l = d.levels() - 1; l >= 0; --l) d.restrict_level(l);
   d.count();
@@ -437,6 +507,8 @@ Vec3d AmrHierarchy::spacing(int level) const { return (domain_upper() - domain_l
 std::array<bool, 3> AmrHierarchy::periodic() const { return data_->mesh.periodic; }
 int AmrHierarchy::dimensions() const { return data_->mesh.dimensions; }
 const std::vector<std::string>& AmrHierarchy::fields() const { return data_->mesh.fields; }
+const std::vector<std::string>& AmrHierarchy::fields_there() const { return data_->mesh.fields_there; }
+const std::string& AmrHierarchy::unit(int field) const { return data_->mesh.units[static_cast<std::size_t>(field)]; }
 
 int AmrHierarchy::field_index(const std::string& field) const {
   const auto& all = fields();
@@ -450,7 +522,7 @@ std::span<const Patch> AmrHierarchy::patches(int level) const { return data_->pa
 int AmrHierarchy::find_patch(int level, const Vec3i& cell) const { return data_->at(level).find(data_->patches(level), cell); }
 std::vector<int> AmrHierarchy::patches_in(int level, const Box& box) const { return data_->patches_in(level, box); }
 std::span<const std::uint8_t> AmrHierarchy::leaf_mask(int level, int patch) const {
-  return data_->leaf[static_cast<std::size_t>(level)][static_cast<std::size_t>(patch)];
+  return data_->mask(level, static_cast<std::size_t>(patch));
 }
 
 bool AmrHierarchy::refined_within(int level, const Box& box) const {
@@ -515,6 +587,23 @@ std::int64_t AmrHierarchy::stored_cells() const {
 bool AmrHierarchy::has_holes() const { return data_->holes; }
 const FieldStatistics& AmrHierarchy::statistics(int field) const { return data_->statistics[static_cast<std::size_t>(field)]; }
 
+/// The lowest corner of all leaves, in cells of the level `finest`.
+Vec3i AmrHierarchy::Data::lower_corner(int finest) const {
+  Vec3i corner(std::numeric_limits<int>::max());
+  for (int l = 0; l <= finest; ++l)
+    for (std::size_t k = 0; k < patches(l).size(); ++k) {
+      const Box& box = patches(l)[k].box;
+      const Vec3i lowest = box.lower * ratio(l, finest);
+      if (glm::all(glm::lessThanEqual(corner, lowest))) continue;  // no cell of it lies lower along any axis
+      const auto is_leaf = mask(l, k);
+      std::size_t i = 0;
+      for_each_cell(box, [&](const Vec3i& c) {
+        if (is_leaf[i++] != 0) corner = glm::min(corner, c * ratio(l, finest));
+      });
+    }
+  return corner;
+}
+
 std::string AmrHierarchy::content_hash(int field) const {
   struct Key {
     std::int32_t x, y, z, width;
@@ -524,31 +613,30 @@ std::string AmrHierarchy::content_hash(int field) const {
   const Data& d = *data_;
   int finest = finest_level();
   while (finest > 0 && leaf_cells(finest) == 0) --finest;
-  const auto for_leaves = [&](auto&& f) {
-    for (int l = 0; l <= finest; ++l)
-      for (std::size_t k = 0; k < d.patches(l).size(); ++k) {
-        const Patch& patch = d.patches(l)[k];
-        const auto& mask = d.leaf[static_cast<std::size_t>(l)][k];
-        std::size_t i = 0;
-        for_each_cell(patch.box, [&](const Vec3i& c) {
-          if (mask[i] != 0) f(c * d.ratio(l, finest), d.ratio(l, finest), patch.values[static_cast<std::size_t>(field)][i]);
-          ++i;
-        });
-      }
-  };
-  Vec3i corner(std::numeric_limits<int>::max());
-  for_leaves([&](const Vec3i& c, int, double) { corner = glm::min(corner, c); });
-  std::uint64_t low = 0;
-  std::uint64_t high = 0;
-  for_leaves([&](const Vec3i& c, int w, double v) {
-    const Vec3i at = c - corner;
-    const float rounded = std::isnan(v) ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(v) + 0.0F;  // -0 is 0
-    const Key key{at.x, at.y, at.z, w, rounded};
-    const XXH128_hash_t h = XXH3_128bits(&key, sizeof key);
-    low += h.low64;  // a sum, since the order of cells must not matter
-    high += h.high64;
-  });
-  return fmt::format("{:016x}{:016x}", high, low);
+  const Vec3i corner = d.lower_corner(finest);
+  std::atomic<std::uint64_t> low = 0;
+  std::atomic<std::uint64_t> high = 0;
+  for (int l = 0; l <= finest; ++l)
+    tbb::parallel_for(std::size_t{0}, d.patches(l).size(), [&](std::size_t k) {
+      const Box& box = d.patches(l)[k].box;
+      const Vec3i size = box.size();
+      const int width = d.ratio(l, finest);
+      std::uint64_t own_low = 0;
+      std::uint64_t own_high = 0;
+      d.for_leaves(l, k, static_cast<std::size_t>(field), [&](std::size_t i, double v) {
+        const auto n = static_cast<std::int64_t>(i);
+        const Vec3i cell(n % size.x, n / size.x % size.y, n / size.x / size.y);
+        const Vec3i at = (box.lower + cell) * width - corner;
+        const float rounded = std::isnan(v) ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(v) + 0.0F;  // -0 is 0
+        const Key key{at.x, at.y, at.z, width, rounded};
+        const XXH128_hash_t h = XXH3_128bits(&key, sizeof key);
+        own_low += h.low64;  // a sum, since the order of cells must not matter
+        own_high += h.high64;
+      });
+      low += own_low;
+      high += own_high;
+    });
+  return fmt::format("{:016x}{:016x}", high.load(), low.load());
 }
 
 }  // namespace amrtex

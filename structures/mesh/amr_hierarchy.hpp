@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "structures/mesh/cell_values.hpp"
 #include "structures/mesh/error.hpp"
 #include "structures/mesh/spaces.hpp"
 
@@ -17,8 +18,8 @@ namespace amrtex {
 
 /// A rectangular block of cells of one level as the simulation wrote it, ghost cells stripped.
 struct Patch {
-  Box box;                                  ///< level space
-  std::vector<std::vector<double>> values;  ///< one array a field, box.cells() values each, x fastest
+  Box box;                         ///< level space
+  std::vector<CellValues> values;  ///< one array a field, box.cells() values each, x fastest
 };
 
 /// What a reader or generator hands over. Level 0 is the coarsest.
@@ -29,6 +30,8 @@ struct MeshDescription {
   Vec3i root_cells{1};      ///< cells of the domain at level 0
   std::vector<int> ratios;  ///< ratios[l] = cells of level l+1 a cell of level l along an axis; levels - 1 of them, each >= 2
   std::vector<std::string> fields;         ///< names of the arrays in each patch
+  std::vector<std::string> units;          ///< of the fields, as the file says them; empty: it says none
+  std::vector<std::string> fields_there;   ///< all that the file has, read or not; empty: those above
   std::vector<std::vector<Patch>> levels;  ///< patches a level; a level may be empty
   std::array<bool, 3> periodic{false, false, false};
   int dimensions = 3;  ///< of the data: 2 for those that stand as a slab, whose values do not change along z
@@ -45,7 +48,7 @@ struct LeafCell {
 struct FieldStatistics {
   double min = std::numeric_limits<double>::quiet_NaN();
   double max = std::numeric_limits<double>::quiet_NaN();
-  double least_magnitude = 0;  ///< smallest magnitude above 0; 0 where there is none
+  double least_magnitude = 0;            ///< smallest magnitude above 0; 0 where there is none
   double volume_integral = 0;            ///< sum of value times cell volume, world units
   std::int64_t cells_without_value = 0;  ///< leaf cells that hold NaN or an infinity
 };
@@ -83,6 +86,10 @@ class AmrHierarchy {
   int dimensions() const;  ///< of the data that the mesh was read from
 
   const std::vector<std::string>& fields() const;
+  /// Of all fields of the file that the mesh was read from, in its order.
+  const std::vector<std::string>& fields_there() const;
+  /// Of the field's values, as the file says it; empty where it says none.
+  const std::string& unit(int field) const;
   /// Index of the field, or a UsageError that names the fields there are.
   int field_index(const std::string& field) const;
 

@@ -11,25 +11,27 @@ namespace {
 void copy_patch(const AmrHierarchy& h, int field, int level, const Box& box, int from, const Patch& patch,
                 std::span<double> out) {
   const int r = h.cell_width(from) / h.cell_width(level);
-  const auto& values = patch.values[static_cast<std::size_t>(field)];
   const Box part = intersection(patch.box.refined(r), box);
-  for (int z = part.lower.z; z < part.upper.z; ++z)
-    for (int y = part.lower.y; y < part.upper.y; ++y) {
-      double* row = &out[box.offset({part.lower.x, y, z})];
-      const double* source = &values[patch.box.offset({floor_div(part.lower.x, r), floor_div(y, r), floor_div(z, r)})];
-      if (r == 1) {
-        std::copy(source, source + (part.upper.x - part.lower.x), row);
-        continue;
-      }
-      int phase = part.lower.x % r;
-      for (int x = part.lower.x; x < part.upper.x; ++x) {
-        *row++ = *source;
-        if (++phase == r) {
-          phase = 0;
-          ++source;
+  const auto length = static_cast<std::size_t>(std::max(0, part.size().x));
+  patch.values[static_cast<std::size_t>(field)].visit([&](const auto& values) {
+    for (int z = part.lower.z; z < part.upper.z; ++z)
+      for (int y = part.lower.y; y < part.upper.y; ++y) {
+        double* const row = &out[box.offset({part.lower.x, y, z})];
+        std::size_t source = patch.box.offset({floor_div(part.lower.x, r), floor_div(y, r), floor_div(z, r)});
+        if (r == 1) {
+          for (std::size_t x = 0; x < length; ++x) row[x] = values[source + x];
+          continue;
+        }
+        int phase = part.lower.x % r;
+        for (std::size_t x = 0; x < length; ++x) {
+          row[x] = values[source];
+          if (++phase == r) {
+            phase = 0;
+            ++source;
+          }
         }
       }
-    }
+  });
 }
 
 /// Cells that only levels above `level` store, over a coarser patch or over none.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <zip.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -13,8 +14,9 @@
 namespace amrtex {
 namespace {
 
-constexpr zip_uint32_t kFast = 1;                   // a sweep waits for it
+constexpr zip_uint32_t kFast = 1;                 // a sweep waits for it
 constexpr std::uint64_t kMostCompression = 1100;  // deflate packs at most 1032 bytes into one
+constexpr std::size_t kNpyStartBytes = 10;        // magic, version, length of the header
 const std::vector<std::string> kTypes = {"<f2", "<f4", "<f8", "<i4", "<i8", "|u1"};
 
 struct Discard {
@@ -86,6 +88,17 @@ std::string text_of(zip_t* archive, zip_uint64_t index, const std::filesystem::p
   return text;
 }
 
+Archive open_archive(const std::filesystem::path& path) {
+  int code = 0;
+  Archive archive(::zip_open(path.c_str(), ZIP_RDONLY, &code));
+  if (archive) return archive;
+  zip_error_t error;
+  ::zip_error_init_with_code(&error, code);
+  const std::string why = ::zip_error_strerror(&error);
+  ::zip_error_fini(&error);
+  refuse(path, why);
+}
+
 }  // namespace
 
 void write_npz(const std::filesystem::path& path, const std::map<std::string, NpyArray>& arrays) {
@@ -101,16 +114,107 @@ void write_npz(const std::filesystem::path& path, const std::map<std::string, Np
   write_atomically(path, buffer.bytes());
 }
 
-std::map<std::string, NpyArray> read_npz(const std::filesystem::path& path) {
-  int code = 0;
-  const Archive archive(::zip_open(path.c_str(), ZIP_RDONLY, &code));
-  if (!archive) {
-    zip_error_t error;
-    ::zip_error_init_with_code(&error, code);
-    const std::string why = ::zip_error_strerror(&error);
-    ::zip_error_fini(&error);
-    refuse(path, why);
+struct NpzFile::Data {
+  std::filesystem::path path;
+  Archive archive;
+
+  std::string in_file(const std::string& name) const { return fmt::format("{}, {}.npy", path.string(), name); }
+  zip_int64_t find(const std::string& name) const {
+    const zip_int64_t index = ::zip_name_locate(archive.get(), (name + ".npy").c_str(), 0);
+    return index >= 0 ? index : ::zip_name_locate(archive.get(), name.c_str(), 0);
   }
+};
+
+namespace {
+
+/// One array of an archive, from its begin on.
+class ArrayStream {
+ public:
+  ArrayStream(zip_t* archive, zip_int64_t index, const std::filesystem::path& path, const std::string& name)
+      : path_(path), file_(index < 0 ? nullptr : ::zip_fopen_index(archive, static_cast<zip_uint64_t>(index), 0)) {
+    if (!file_) refuse(path, fmt::format("{}: {}", name, ::zip_strerror(archive)));
+    std::string head(kNpyStartBytes, '\0');
+    head.resize(take(head.data(), head.size()));
+    if (head.size() == kNpyStartBytes) {
+      const std::size_t length = static_cast<unsigned char>(head[8]) + std::size_t{256} * static_cast<unsigned char>(head[9]);
+      head.resize(kNpyStartBytes + length);
+      head.resize(kNpyStartBytes + take(head.data() + kNpyStartBytes, length));
+    }
+    header_ = parse_npy_header(head, name, kTypes);
+    zip_stat_t stat;
+    if (::zip_stat_index(archive, static_cast<zip_uint64_t>(index), 0, &stat) != 0) refuse(path, ::zip_strerror(archive));
+    // what says more than its file can hold would be allocated first
+    if (stat.size / kMostCompression > std::filesystem::file_size(path))
+      refuse(path, fmt::format("says that it holds an array of {} bytes, more than its size can hold", stat.size));
+    require_npy_bytes(header_, stat.size - std::min<std::uint64_t>(stat.size, header_.bytes), name);
+  }
+
+  const NpyHeader& header() const { return header_; }
+  void read(void* out, std::uint64_t bytes) {
+    if (out != nullptr) {
+      if (take(out, bytes) != bytes) refuse(path_, "is damaged");
+      return;
+    }
+    std::vector<char> passed(static_cast<std::size_t>(std::min<std::uint64_t>(bytes, std::uint64_t{1} << 18)));
+    for (std::uint64_t left = bytes; left > 0;) {
+      const std::uint64_t part = std::min<std::uint64_t>(left, passed.size());
+      if (take(passed.data(), part) != part) refuse(path_, "is damaged");
+      left -= part;
+    }
+  }
+  /// libzip compares the checksum at the end of a file.
+  void finish() {
+    char more = 0;
+    if (::zip_fread(file_.get(), &more, 1) != 0) refuse(path_, "is damaged");
+  }
+
+ private:
+  std::uint64_t take(void* out, std::uint64_t bytes) {
+    std::uint64_t done = 0;
+    while (done < bytes) {
+      const zip_int64_t got = ::zip_fread(file_.get(), static_cast<char*>(out) + done, bytes - done);
+      if (got < 0) refuse(path_, "is damaged");
+      if (got == 0) break;
+      done += static_cast<std::uint64_t>(got);
+    }
+    return done;
+  }
+
+  std::filesystem::path path_;
+  std::unique_ptr<zip_file_t, Discard> file_;
+  NpyHeader header_;
+};
+
+}  // namespace
+
+NpzFile::NpzFile(const std::filesystem::path& path) : data_(new Data{path, open_archive(path)}) {}
+NpzFile::~NpzFile() = default;
+NpzFile::NpzFile(NpzFile&&) noexcept = default;
+NpzFile& NpzFile::operator=(NpzFile&&) noexcept = default;
+
+bool NpzFile::has(const std::string& name) const { return data_->find(name) >= 0; }
+
+NpyHeader NpzFile::header(const std::string& name) const {
+  return ArrayStream(data_->archive.get(), data_->find(name), data_->path, data_->in_file(name)).header();
+}
+
+NpyArray NpzFile::read(const std::string& name) const {
+  ArrayStream stream(data_->archive.get(), data_->find(name), data_->path, data_->in_file(name));
+  NpyArray array{stream.header().type, stream.header().shape,
+                 std::string(static_cast<std::size_t>(stream.header().value_bytes), '\0')};
+  stream.read(array.bytes.data(), array.bytes.size());
+  stream.finish();
+  return array;
+}
+
+void NpzFile::stream(const std::string& name, const std::function<void(const NextBytes&)>& values) const {
+  ArrayStream stream(data_->archive.get(), data_->find(name), data_->path, data_->in_file(name));
+  values([&](void* out, std::uint64_t bytes) { stream.read(out, bytes); });
+  stream.finish();
+}
+
+std::map<std::string, NpyArray> read_npz(const std::filesystem::path& path) {
+  const Archive archive = open_archive(path);
   std::map<std::string, NpyArray> arrays;
   const zip_int64_t count = ::zip_get_num_entries(archive.get(), 0);
   for (zip_int64_t i = 0; i < count; ++i) {

@@ -118,6 +118,15 @@ void OutputFile::write(std::string_view bytes) {
   written_ += bytes.size();
 }
 
+void OutputFile::write_doubles(const CellValues& values) {
+  std::vector<double> some(std::min(values.size(), std::size_t{1} << 16));
+  for (std::size_t at = 0; at < values.size(); at += some.size()) {
+    some.resize(std::min(some.size(), values.size() - at));
+    values.copy(at, some);
+    write_values(some);
+  }
+}
+
 void OutputFile::close() {
   out_.close();
   check();

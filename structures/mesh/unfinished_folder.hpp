@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "structures/mesh/cell_values.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {
@@ -50,6 +51,8 @@ class OutputFile {
   void write_values(const std::vector<T>& values) {
     write({reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)});
   }
+  /// Values of any type as doubles.
+  void write_doubles(const CellValues& values);
   std::uint64_t written() const { return written_; }
   void close();
 

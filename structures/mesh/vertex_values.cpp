@@ -22,9 +22,10 @@ std::vector<int> holding_levels(const AmrHierarchy& h, int field, int level, con
     const int r = h.cell_width(coarser) / h.cell_width(level);
     for (const int k : h.patches_in(coarser, inside.coarsened(r))) {
       const Patch& patch = h.patches(coarser)[static_cast<std::size_t>(k)];
-      const auto& values = patch.values[static_cast<std::size_t>(field)];
-      for_each_cell(intersection(patch.box.refined(r), inside), [&](const Vec3i& cell) {
-        holding[box.offset(cell)] = std::isnan(values[patch.box.offset(cell / r)]) ? level : coarser;
+      patch.values[static_cast<std::size_t>(field)].visit([&](const auto& values) {
+        for_each_cell(intersection(patch.box.refined(r), inside), [&](const Vec3i& cell) {
+          holding[box.offset(cell)] = std::isnan(values[patch.box.offset(cell / r)]) ? level : coarser;
+        });
       });
     }
   }

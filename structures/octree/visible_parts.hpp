@@ -82,7 +82,7 @@ class VisibleParts {
   void find_visible(int level, const PatchPart& part, WindowRanges& window, std::vector<std::uint8_t>& shown,
                     std::vector<Key>& keys) const {
     const Patch& patch = hierarchy_.patches(level)[part.patch];
-    const auto& values = patch.values[static_cast<std::size_t>(request_.field)];
+    const CellValues& values = patch.values[static_cast<std::size_t>(request_.field)];
     const auto mask = hierarchy_.leaf_mask(level, static_cast<int>(part.patch));
     const Box domain = ghosts_ ? hierarchy_.domain(level).grown(1) : hierarchy_.domain(level);
     const Vec3l first = -root_.lower / std::int64_t{hierarchy_.cell_width(level)};  // the domain's first cell in the tree
@@ -94,9 +94,10 @@ class VisibleParts {
     if (linear()) window.read(hierarchy_, request_.field, level, part.box);
     for_each_cell(part.box, [&](const Vec3i& c) {
       const std::size_t i = patch.box.offset(c);
-      if (mask[i] == 0 || std::isnan(values[i])) return;
+      const double value = mask[i] == 0 ? std::numeric_limits<double>::quiet_NaN() : values[i];
+      if (std::isnan(value)) return;
       ValueRange range;
-      range.add(values[i]);
+      range.add(value);
       if (linear()) window.add_to(range, c);
       if (hidden(request_.needs, range, origin_, request_.storage, scale_)) return;
       shown[i] = 1;

@@ -229,11 +229,9 @@ LevelData locate_level(const ChomboLayout& layout, const ChomboLevel& level, Cho
 
 void read_patch(const LevelData& level, const PatchPlace& place, Patch& patch) {
   patch.box = place.valid;
-  patch.values.resize(level.fields.size());
-  for (std::size_t f = 0; f < level.fields.size(); ++f) {
-    patch.values[f].resize(static_cast<std::size_t>(place.valid.cells()));
-    level.fields[f].read_box(place.first + level.component_first[f] * place.cells, place.stored, place.valid, patch.values[f]);
-  }
+  for (std::size_t f = 0; f < level.fields.size(); ++f)
+    patch.values.push_back(
+        level.fields[f].read_box(place.first + level.component_first[f] * place.cells, place.stored, place.valid));
 }
 
 }  // namespace
@@ -253,23 +251,26 @@ ChomboLayout scan_chombo_layout(const std::filesystem::path& path) {
 }
 
 MeshDescription read_chombo_layout(const ChomboLayout& layout, ChomboComponents components, const Vec3d& lower,
-                                   const Vec3d& upper, const std::vector<std::string>& fields) {
+                                   const Vec3d& upper, const FieldChoice& fields) {
   const std::filesystem::path& path = layout.file.path();
-  const std::vector<std::size_t> wanted = wanted_fields(path, layout.fields, fields);
+  const std::vector<std::size_t> wanted = fields.among(path, layout.fields);
   MeshDescription mesh;
   mesh.name = dataset_name(path);
   mesh.domain_lower = lower;
   mesh.domain_upper = upper;
   mesh.root_cells = Vec3i(layout.levels.front().domain.size());
   mesh.ratios = layout.ratios;
+  mesh.fields_there = layout.fields;
   for (const std::size_t component : wanted) mesh.fields.push_back(layout.fields[component]);
   std::vector<LevelData> sources;
-  CheckedSize cells;
+  CheckedSize bytes;
   for (const ChomboLevel& level : layout.levels) {
     sources.push_back(locate_level(layout, level, components, wanted));
-    for (const PatchPlace& place : sources.back().patches) cells += place.valid.cells();
+    for (const PatchPlace& place : sources.back().patches)
+      for (const Hdf5Numbers& field : sources.back().fields)
+        bytes += CheckedSize(place.valid.cells()) * static_cast<std::int64_t>(bytes_of(field.type()));
   }
-  require_memory(path, cells, wanted.size());
+  require_memory(path, bytes, 1, 1);
   mesh.levels.resize(sources.size());
   for (std::size_t l = 0; l < sources.size(); ++l) {
     const LevelData& level = sources[l];

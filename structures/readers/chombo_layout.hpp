@@ -20,6 +20,7 @@
 #include "structures/mesh/amr_hierarchy.hpp"
 #include "structures/readers/hdf5_file.hpp"
 #include "structures/readers/index_box.hpp"
+#include "structures/readers/wanted_fields.hpp"
 
 namespace amrtex {
 
@@ -48,8 +49,8 @@ enum class ChomboComponents {
 /// Reads all but the values. Throws Error naming the object and what is wrong with it.
 ChomboLayout scan_chombo_layout(const std::filesystem::path& path);
 
-/// Reads these fields, or all when none is given, into a mesh over the box of the world between these corners.
+/// Reads these fields into a mesh over the box of the world between these corners.
 MeshDescription read_chombo_layout(const ChomboLayout& layout, ChomboComponents components, const Vec3d& lower,
-                                   const Vec3d& upper, const std::vector<std::string>& fields);
+                                   const Vec3d& upper, const FieldChoice& fields);
 
 }  // namespace amrtex

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cerrno>
 #include <cstring>
 #include <mutex>
@@ -608,61 +609,71 @@ struct Hdf5Numbers::Data {
   Hdf5Shape shape;
   std::uint64_t count = 0;
   std::size_t bytes_each = 0;
+  RealType type = RealType::float64;
   std::optional<std::uint64_t> place;  ///< byte of the first value, where it is read directly
 
-  void read_directly(std::uint64_t first, std::span<double> out) const;
-  void read_by_library(std::uint64_t first, std::span<double> out) const;
+  template <class T>
+  void read_directly(std::uint64_t first, std::span<T> out) const;
+  void read_by_library(std::uint64_t first, std::size_t values, void* out) const;
 };
 
-void Hdf5Numbers::Data::read_directly(std::uint64_t first, std::span<double> out) const {
+template <class T>
+void Hdf5Numbers::Data::read_directly(std::uint64_t first, std::span<T> out) const {
   const std::size_t pieces = (out.size() + kPieceValues - 1) / kPieceValues;
   tbb::parallel_for(std::size_t{0}, pieces, [&](std::size_t piece) {
     const std::size_t from = piece * kPieceValues;
-    const std::span<double> part = out.subspan(from, std::min(kPieceValues, out.size() - from));
-    const std::uint64_t begin = *place + (first + from) * bytes_each;
-    if (bytes_each == sizeof(double)) {
-      read_bytes(file->descriptor, file->path, begin, reinterpret_cast<std::byte*>(part.data()), part.size_bytes());
-      return;
-    }
-    std::vector<float> narrow(part.size());
-    read_bytes(file->descriptor, file->path, begin, reinterpret_cast<std::byte*>(narrow.data()), narrow.size() * sizeof(float));
-    std::copy(narrow.begin(), narrow.end(), part.begin());  // widened, which is exact
+    const std::span<T> part = out.subspan(from, std::min(kPieceValues, out.size() - from));
+    read_bytes(file->descriptor, file->path, *place + (first + from) * sizeof(T), reinterpret_cast<std::byte*>(part.data()),
+               part.size_bytes());
   });
 }
 
-void Hdf5Numbers::Data::read_by_library(std::uint64_t first, std::span<double> out) const {
+void Hdf5Numbers::Data::read_by_library(std::uint64_t first, std::size_t values, void* out) const {
   const LibraryCall call;
   file->start();
   std::vector<hsize_t> start(shape.size(), 0);
   std::vector<hsize_t> size(shape.begin(), shape.end());
   const std::uint64_t row = count / std::max<std::uint64_t>(1, shape.front());
-  if (row == 0 || first % row != 0 || out.size() % row != 0)
-    file->fail(name, fmt::format("{} values from {} on are no whole rows of {}", out.size(), first, amrtex::text(shape)));
+  if (row == 0 || first % row != 0 || values % row != 0)
+    file->fail(name, fmt::format("{} values from {} on are no whole rows of {}", values, first, amrtex::text(shape)));
   start.front() = first / row;
-  size.front() = out.size() / row;
+  size.front() = values / row;
+  const hid_t as = type == RealType::float32 ? H5T_NATIVE_FLOAT : H5T_NATIVE_DOUBLE;
   const Handle space(H5Dget_space(set.get()), H5Sclose);
   const Handle memory(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr), H5Sclose);
   if (!space || !memory || H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, size.data(), nullptr) < 0 ||
-      H5Dread(set.get(), H5T_NATIVE_DOUBLE, memory.get(), space.get(), H5P_DEFAULT, out.data()) < 0)
+      H5Dread(set.get(), as, memory.get(), space.get(), H5P_DEFAULT, out) < 0)
     file->fail_call(name, "cannot be read");
 }
 
 const Hdf5Shape& Hdf5Numbers::shape() const { return data_->shape; }
 std::uint64_t Hdf5Numbers::count() const { return data_->count; }
 int Hdf5Numbers::bytes_each() const { return static_cast<int>(data_->bytes_each); }
+RealType Hdf5Numbers::type() const { return data_->type; }
 bool Hdf5Numbers::parallel() const { return data_->place.has_value(); }
 
-void Hdf5Numbers::read(std::uint64_t first, std::span<double> out) const {
+template <class T>
+void Hdf5Numbers::read(std::uint64_t first, std::span<T> out) const {
+  assert(sizeof(T) == bytes_of(type()));
   if (first > count() || out.size() > count() - first)
     data_->file->fail(data_->name, fmt::format("{} values from {} on are wanted; it holds {}", out.size(), first, count()));
   if (out.empty()) return;
   if (parallel())
     data_->read_directly(first, out);
   else
-    data_->read_by_library(first, out);
+    data_->read_by_library(first, out.size(), out.data());
+}
+template void Hdf5Numbers::read(std::uint64_t, std::span<float>) const;
+template void Hdf5Numbers::read(std::uint64_t, std::span<double>) const;
+
+CellValues Hdf5Numbers::read_box(std::uint64_t first, const Box& stored, const Box& valid) const {
+  CellValues values(type(), static_cast<std::size_t>(valid.cells()));
+  values.visit_stored([&](auto& out) { read_within(first, stored, valid, std::span(out)); });
+  return values;
 }
 
-void Hdf5Numbers::read_box(std::uint64_t first, const Box& stored, const Box& valid, std::span<double> out) const {
+template <class T>
+void Hdf5Numbers::read_within(std::uint64_t first, const Box& stored, const Box& valid, std::span<T> out) const {
   if (stored == valid) {
     read(first, out);
     return;
@@ -675,11 +686,11 @@ void Hdf5Numbers::read_box(std::uint64_t first, const Box& stored, const Box& va
   const auto read_group = [&](int group) {
     const Box part{Vec3i(stored.lower.x, stored.lower.y, valid.lower.z + group * at_once),
                    Vec3i(stored.upper.x, stored.upper.y, std::min(valid.lower.z + (group + 1) * at_once, valid.upper.z))};
-    std::vector<double> buffer(static_cast<std::size_t>(part.cells()));
-    read(first + plane * static_cast<std::uint64_t>(part.lower.z - stored.lower.z), buffer);
+    CellArray<T> buffer(static_cast<std::size_t>(part.cells()));
+    read(first + plane * static_cast<std::uint64_t>(part.lower.z - stored.lower.z), std::span(buffer));
     for (int z = part.lower.z; z < part.upper.z; ++z)
       for (int y = valid.lower.y; y < valid.upper.y; ++y) {
-        const double* from = buffer.data() + part.offset({valid.lower.x, y, z});
+        const T* from = buffer.data() + part.offset({valid.lower.x, y, z});
         std::copy(from, from + row, out.data() + valid.offset({valid.lower.x, y, z}));
       }
   };
@@ -710,7 +721,9 @@ Hdf5Numbers Hdf5File::open_numbers(const std::string& dataset, std::size_t rank)
   data->name = dataset;
   data->count = d.count;
   data->bytes_each = d.type_bytes;
-  const bool of_this_machine = H5Tequal(d.type.get(), H5T_NATIVE_DOUBLE) > 0 || H5Tequal(d.type.get(), H5T_NATIVE_FLOAT) > 0;
+  const auto is = [&](hid_t type) { return H5Tequal(d.type.get(), type) > 0; };
+  const bool of_this_machine = is(H5T_NATIVE_DOUBLE) || is(H5T_NATIVE_FLOAT);
+  data->type = is(H5T_IEEE_F32LE) || is(H5T_IEEE_F32BE) ? RealType::float32 : RealType::float64;
   if (d.contiguous && of_this_machine && d.count > 0) {
     const haddr_t place = H5Dget_offset(d.set.get());
     const std::uint64_t bytes = d.count * d.type_bytes;  // no more than the file has, as was checked

@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "structures/mesh/cell_values.hpp"
 #include "structures/mesh/spaces.hpp"
 
 namespace amrtex {
@@ -37,17 +38,22 @@ class Hdf5Numbers {
   const Hdf5Shape& shape() const;
   std::uint64_t count() const;
   int bytes_each() const;  ///< of a value in the file
+  /// What holds every value exactly; float64 for those that are wider.
+  RealType type() const;
   /// May several threads read at once? The library takes one call at a time.
   bool parallel() const;
-  /// Reads out.size() values from the flat position `first` on. Where the data set has several axes and goes through the
-  /// library, these have to be whole rows of the first one.
-  void read(std::uint64_t first, std::span<double> out) const;
+  /// Reads values from the flat position `first` on, as many as `out` has, which are of type(). Where the data set has several
+  /// axes and goes through the library, these have to be whole rows of the first one.
+  template <class T>
+  void read(std::uint64_t first, std::span<T> out) const;
   /// Reads what `valid` holds of an array over `stored` that begins at the flat position `first`, x fastest.
-  void read_box(std::uint64_t first, const Box& stored, const Box& valid, std::span<double> out) const;
+  CellValues read_box(std::uint64_t first, const Box& stored, const Box& valid) const;
 
  private:
   friend class Hdf5File;
   struct Data;
+  template <class T>
+  void read_within(std::uint64_t first, const Box& stored, const Box& valid, std::span<T> out) const;
   std::shared_ptr<const Data> data_;
 };
 

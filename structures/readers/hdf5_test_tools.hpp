@@ -219,9 +219,12 @@ inline double value_at(std::size_t level, std::size_t field, const Vec3i& cell) 
 inline std::vector<Patch> patches_of(const std::vector<Box>& boxes, std::size_t level, std::size_t fields) {
   std::vector<Patch> patches;
   for (const Box& box : boxes) {
-    Patch patch{box, std::vector<std::vector<double>>(fields)};
-    for (std::size_t f = 0; f < fields; ++f)
-      for_each_cell(box, [&](const Vec3i& cell) { patch.values[f].push_back(value_at(level, f, cell)); });
+    Patch patch{box, {}};
+    for (std::size_t f = 0; f < fields; ++f) {
+      std::vector<double> values;
+      for_each_cell(box, [&](const Vec3i& cell) { values.push_back(value_at(level, f, cell)); });
+      patch.values.emplace_back(values);
+    }
     patches.push_back(std::move(patch));
   }
   return patches;

@@ -12,11 +12,22 @@ std::int64_t slab_cells(const MeshDescription& mesh, std::size_t level) {
   return std::min<std::int64_t>(cells.or_most(), std::numeric_limits<std::int32_t>::max());
 }
 
+namespace {
+
+RealType type_of(const MeshDescription& mesh, std::size_t field) {
+  for (const auto& level : mesh.levels)
+    for (const Patch& patch : level)
+      if (patch.values[field].type() == RealType::float64) return RealType::float64;
+  return RealType::float32;
+}
+
+}  // namespace
+
 void make_slab(MeshDescription& mesh, const std::filesystem::path& path) {
   CheckedSize cells;
   for (std::size_t level = 0; level < mesh.levels.size(); ++level)
     for (const Patch& patch : mesh.levels[level]) cells += CheckedSize(patch.box.cells()) * slab_cells(mesh, level);
-  require_memory(path, cells, mesh.fields.size());
+  for (std::size_t field = 0; field < mesh.fields.size(); ++field) require_memory(path, cells, 1, bytes_of(type_of(mesh, field)));
   const Vec3d edge = (mesh.domain_upper - mesh.domain_lower) / Vec3d(mesh.root_cells) /
                      static_cast<double>(slab_cells(mesh, mesh.levels.size() - 1));
   mesh.dimensions = 2;
@@ -28,12 +39,12 @@ void make_slab(MeshDescription& mesh, const std::filesystem::path& path) {
       const auto depth = static_cast<std::size_t>(slab_cells(mesh, level));
       patch.box.lower.z = 0;
       patch.box.upper.z = static_cast<int>(depth);
-      for (auto& values : patch.values) {
-        const std::size_t plane = values.size();
-        values.resize(plane * depth);
-        for (std::size_t z = 1; z < depth; ++z)
-          std::copy_n(values.begin(), plane, values.begin() + static_cast<std::ptrdiff_t>(z * plane));
-      }
+      for (CellValues& values : patch.values)
+        values.visit_stored([&](auto& stored) {
+          const std::size_t plane = stored.size();
+          stored.resize(plane * depth);
+          for (std::size_t z = 1; z < depth; ++z) std::copy_n(stored.data(), plane, stored.data() + z * plane);
+        });
     }
 }
 

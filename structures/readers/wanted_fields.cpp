@@ -21,15 +21,15 @@ std::string nearest(const std::vector<std::string>& there, const std::string& fi
 
 }  // namespace
 
-std::vector<std::size_t> wanted_fields(const std::filesystem::path& path, const std::vector<std::string>& there,
-                                       const std::vector<std::string>& wanted) {
-  std::vector<std::size_t> indices(wanted.empty() ? there.size() : wanted.size());
+std::vector<std::size_t> FieldChoice::among(const std::filesystem::path& path, const std::vector<std::string>& there) const {
+  const std::size_t unnamed = first_ ? std::min<std::size_t>(1, there.size()) : there.size();
+  std::vector<std::size_t> indices(names_.empty() ? unnamed : names_.size());
   std::iota(indices.begin(), indices.end(), std::size_t{0});
-  for (std::size_t i = 0; i < wanted.size(); ++i) {
-    const auto found = std::find(there.begin(), there.end(), wanted[i]);
+  for (std::size_t i = 0; i < names_.size(); ++i) {
+    const auto found = std::find(there.begin(), there.end(), names_[i]);
     if (found == there.end())
-      throw UsageError(fmt::format("{}: no field {}{}; its fields are {}", path.string(), quote(wanted[i]),
-                                   nearest(there, wanted[i]), listed(there)));
+      throw UsageError(fmt::format("{}: no field {}{}; its fields are {}", path.string(), quote(names_[i]),
+                                   nearest(there, names_[i]), listed(there)));
     indices[i] = static_cast<std::size_t>(found - there.begin());
   }
   return indices;

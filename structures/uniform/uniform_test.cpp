@@ -123,7 +123,7 @@ TEST(Uniform, OfVerticesOfACoarserLevelIsTheFilterOfTheMeshCutOffThere) {
   const AmrHierarchy h = nested(waves).hierarchy();
   MeshBuilder cut({8, 7, 8}, {2});
   for (int level = 0; level < 2; ++level)
-    for (const Patch& patch : h.patches(level)) cut.patch(level, patch.box, patch.values[0]);
+    for (const Patch& patch : h.patches(level)) cut.patch(level, patch.box, patch.values[0].doubles());
   const AmrHierarchy coarse = cut.hierarchy();
   const auto positions = probe_positions(h, 60);
   const HierarchyReference reference(coarse, 0, {Filter::linear_vertex});

@@ -79,7 +79,7 @@ bool is_amrex_hdf5(const fs::path& path) {
   return file.has_attribute("/", "plotfile_type") || (file.has_attribute("/", "version_name") && file.has("level_0"));
 }
 
-MeshDescription read_amrex_hdf5(const fs::path& path, const std::vector<std::string>& fields) {
+MeshDescription read_amrex_hdf5(const fs::path& path, const FieldChoice& fields) {
   check_version(Hdf5File(path));
   ChomboLayout layout = scan_chombo_layout(path);
   refuse_centring(layout);

@@ -6,13 +6,13 @@
 #include <vector>
 
 #include "structures/mesh/amr_hierarchy.hpp"
+#include "structures/readers/wanted_fields.hpp"
 
 namespace amrtex {
 
 /// True for an HDF5 file that says which kind of AMReX plot file it is.
 bool is_amrex_hdf5(const std::filesystem::path& path);
 
-/// Reads these fields, or all when none is given.
-MeshDescription read_amrex_hdf5(const std::filesystem::path& path, const std::vector<std::string>& fields);
+MeshDescription read_amrex_hdf5(const std::filesystem::path& path, const FieldChoice& fields);
 
 }  // namespace amrtex

@@ -5,16 +5,22 @@
 #include <filesystem>
 #include <map>
 #include <string>
-#include <utility>
 #include <vector>
 
+#include "structures/mesh/cell_values.hpp"
 #include "structures/readers/amrex_plotfile/amrex_header.hpp"
 
 namespace amrtex {
 
+struct LevelFile {
+  std::filesystem::path path;
+  std::uint64_t bytes = 0;
+  bool outside = false;  ///< a link leads to it from the plotfile
+};
+
 /// A patch's values in a data file.
 struct FabSource {
-  const std::filesystem::path* file = nullptr;
+  const LevelFile* file = nullptr;
   std::uint64_t values_begin = 0;
   RealFormat format;
   IndexBox stored;  ///< with ghost cells
@@ -22,7 +28,7 @@ struct FabSource {
 };
 
 struct LevelSources {
-  std::map<std::string, std::pair<std::filesystem::path, std::uint64_t>> files;  ///< by name: path and size in bytes
+  std::map<std::string, LevelFile> files;  ///< by name
   std::vector<FabSource> fabs;
 };
 
@@ -31,7 +37,6 @@ struct LevelSources {
 LevelSources locate_level(const PlotHeader& header, std::size_t level);
 
 /// Reads one array a wanted component, without ghost cells, x fastest.
-std::vector<std::vector<double>> read_components(const FabSource& fab, std::size_t components,
-                                                 const std::vector<std::size_t>& wanted);
+std::vector<CellValues> read_components(const FabSource& fab, std::size_t components, const std::vector<std::size_t>& wanted);
 
 }  // namespace amrtex

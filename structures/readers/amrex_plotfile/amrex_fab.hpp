@@ -11,8 +11,9 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <optional>
+#include <span>
+#include <type_traits>
 
 #include "structures/mesh/checked.hpp"
 #include "structures/readers/index_box.hpp"
@@ -85,24 +86,14 @@ constexpr std::uint64_t reversed(std::uint64_t v) {
   return (std::uint64_t{reversed(static_cast<std::uint32_t>(v))} << 32) | reversed(static_cast<std::uint32_t>(v >> 32));
 }
 
-template <class Bits, class Real>
-void decode_as(const std::byte* in, std::size_t count, bool swap, double* out) {
-  for (std::size_t i = 0; i < count; ++i) {
-    Bits bits;
-    std::memcpy(&bits, in + i * sizeof(Bits), sizeof(Bits));
-    out[i] = static_cast<double>(std::bit_cast<Real>(swap ? reversed(bits) : bits));
-  }
-}
-
 }  // namespace detail
 
-/// `count` numbers as doubles; float32 is widened, which is exact.
-inline void decode_reals(const std::byte* in, std::size_t count, const RealFormat& format, double* out) {
-  const bool swap = format.order != std::endian::native;
-  if (format.bytes == 8)
-    detail::decode_as<std::uint64_t, double>(in, count, swap, out);
-  else
-    detail::decode_as<std::uint32_t, float>(in, count, swap, out);
+/// Numbers as they were read, into this machine's order of bytes.
+template <class Real>
+void set_byte_order(std::span<Real> numbers, const RealFormat& format) {
+  using Bits = std::conditional_t<sizeof(Real) == 8, std::uint64_t, std::uint32_t>;
+  if (format.order == std::endian::native) return;
+  for (Real& number : numbers) number = std::bit_cast<Real>(detail::reversed(std::bit_cast<Bits>(number)));
 }
 
 }  // namespace amrtex

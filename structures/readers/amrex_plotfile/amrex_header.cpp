@@ -19,15 +19,16 @@ constexpr std::int64_t kInt32Min = std::numeric_limits<std::int32_t>::min();
 constexpr std::int64_t kInt32Max = std::numeric_limits<std::int32_t>::max();
 constexpr std::int64_t kMaxLevels = 64;
 
-Vec3l scan_tuple(TextScanner& in, std::string_view what, std::int64_t lowest, std::int64_t highest) {
+/// `(x,y,z)`, or `(x,y)` with 0 behind it.
+Vec3l scan_tuple(TextScanner& in, int dimensions, std::string_view what, std::int64_t lowest, std::int64_t highest) {
+  Vec3l tuple(0);
   in.expect("(", what);
-  const std::int64_t x = in.integer(what, lowest, highest);
-  in.expect(",", what);
-  const std::int64_t y = in.integer(what, lowest, highest);
-  in.expect(",", what);
-  const std::int64_t z = in.integer(what, lowest, highest);
+  for (int axis = 0; axis < dimensions; ++axis) {
+    if (axis > 0) in.expect(",", what);
+    tuple[axis] = in.integer(what, lowest, highest);
+  }
   in.expect(")", what);
-  return {x, y, z};
+  return tuple;
 }
 
 /// A count of things that take at least `bytes_each` bytes of the rest of the text.
@@ -75,14 +76,16 @@ void scan_fields(TextScanner& in, PlotHeader& header) {
   }
 }
 
-void scan_dimension(TextScanner& in, std::size_t fields) {
-  const std::int64_t dimension = in.integer(fmt::format("the dimension behind the names of {} fields", fields), 1, 3);
-  if (dimension != 3) in.fail(fmt::format("the data are {}-dimensional; only 3-dimensional plotfiles can be read", dimension));
+int scan_dimensions(TextScanner& in, std::size_t fields) {
+  const std::int64_t dimensions = in.integer(fmt::format("the dimension behind the names of {} fields", fields), 1, 3);
+  if (dimensions == 1) in.fail("the data are 1-dimensional; 2 and 3 dimensions can be read");
+  return static_cast<int>(dimensions);
 }
 
-Vec3d scan_corner(TextScanner& in, std::string_view what) {
-  Vec3d corner(0);
-  for (int axis = 0; axis < 3; ++axis) {
+/// Along an axis that there is not: `otherwise`.
+Vec3d scan_corner(TextScanner& in, int dimensions, std::string_view what, double otherwise) {
+  Vec3d corner(otherwise);
+  for (int axis = 0; axis < dimensions; ++axis) {
     corner[axis] = in.real(what);
     if (!std::isfinite(corner[axis])) in.fail(fmt::format("{} is not finite", what));
   }
@@ -90,12 +93,13 @@ Vec3d scan_corner(TextScanner& in, std::string_view what) {
 }
 
 /// The ratio between two levels follows from their domains: the line of ratios holds only one axis.
-int ratio_between(const TextScanner& in, const IndexBox& coarse, const IndexBox& fine, std::size_t level) {
+int ratio_between(const TextScanner& in, int dimensions, const IndexBox& coarse, const IndexBox& fine, std::size_t level) {
   const std::string where =
       fmt::format("from level {} with the domain {} to level {} with {}", level, text(coarse), level + 1, text(fine));
-  const Vec3l ratio = fine.size() / coarse.size();
+  Vec3l ratio = fine.size() / coarse.size();
   if (ratio * coarse.size() != fine.size() || coarse.lower * ratio != fine.lower)
     in.fail(fmt::format("no whole refinement ratio leads {}", where));
+  if (dimensions == 2) ratio.z = ratio.x;
   if (ratio.x != ratio.y || ratio.x != ratio.z)
     in.fail(fmt::format("the refinement ratio differs between the axes, {}, {}; only the same ratio along all can be read",
                         text(ratio), where));
@@ -109,9 +113,9 @@ void scan_domains(TextScanner& in, PlotHeader& header, std::size_t levels) {
   while (in.peek() != '(') stated.push_back(in.integer("a refinement ratio or a level's domain", 0, kInt32Max));
   if (stated.size() + 1 < levels) in.fail(fmt::format("{} refinement ratios for {} levels", stated.size(), levels));
   for (std::size_t level = 0; level < levels; ++level) {
-    header.domains.push_back(scan_box(in, fmt::format("the domain of level {}", level)));
+    header.domains.push_back(scan_box(in, header.dimensions, fmt::format("the domain of level {}", level)));
     if (level == 0) continue;
-    header.ratios.push_back(ratio_between(in, header.domains[level - 1], header.domains[level], level - 1));
+    header.ratios.push_back(ratio_between(in, header.dimensions, header.domains[level - 1], header.domains[level], level - 1));
     if (stated[level - 1] != header.ratios.back())
       in.fail(fmt::format("the refinement ratio from level {} to {} is stated as {}, but the domains make it {}", level - 1,
                           level, stated[level - 1], header.ratios.back()));
@@ -124,7 +128,7 @@ void scan_cell_size(TextScanner& in, const PlotHeader& header, std::size_t level
   constexpr double kRounding = 1e-4;  // relative
   const Vec3d cells(header.domains[level].size());
   const Vec3d expected = (header.upper - header.lower) / cells;
-  for (int axis = 0; axis < 3; ++axis) {
+  for (int axis = 0; axis < header.dimensions; ++axis) {
     const double stated = in.real("the size of a level's cells");
     if (std::abs(stated - expected[axis]) <= kRounding * expected[axis]) continue;
     in.fail(fmt::format("the cells of level {} are said to be {} wide along {}, but the domain and its {} cells make them {}",
@@ -142,28 +146,30 @@ void scan_coordinate_system(TextScanner& in) {
 }
 
 /// Physical bounds are passed over: the boxes of `Cell_H` are exact.
-LevelEntry scan_level_entry(TextScanner& in, const fs::path& folder, std::int64_t level) {
+LevelEntry scan_level_entry(TextScanner& in, const PlotHeader& header, std::int64_t level) {
   LevelEntry entry;
   in.integer(fmt::format("the number {} of the level", level), level, level);
-  entry.grids = scan_count(in, "grids", 12);
+  entry.grids = scan_count(in, "grids", 4 * header.dimensions);
   in.real("the time of the level");
   in.integer("the step of the level", std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max());
-  for (std::int64_t i = 0; i < 6 * entry.grids; ++i) in.real("a bound of a grid");
+  for (std::int64_t i = 0; i < 2 * header.dimensions * entry.grids; ++i) in.real("a bound of a grid");
   in.line("the end of the line");
-  entry.cell_header = folder / scan_level_path(in);
+  entry.cell_header = header.folder / scan_level_path(in);
   entry.cell_header += "_H";
   return entry;
 }
 
 /// `(n 0`, then n boxes, then `)`.
-void scan_boxes(TextScanner& in, CellHeader& cells, std::int64_t level, const LevelEntry& entry, const IndexBox& domain) {
+void scan_boxes(TextScanner& in, CellHeader& cells, const PlotHeader& header, std::size_t level) {
+  const LevelEntry& entry = header.levels[level];
+  const IndexBox& domain = header.domains[level];
   in.expect("(", "the list of boxes");
-  const std::int64_t count = scan_count(in, "boxes", 15);
+  const std::int64_t count = scan_count(in, "boxes", 13);
   if (count != entry.grids) in.fail(fmt::format("{} boxes, but Header has {} grids in level {}", count, entry.grids, level));
   in.integer("the number behind the count of boxes", 0, std::numeric_limits<std::int64_t>::max());
   cells.boxes.reserve(static_cast<std::size_t>(count));
   for (std::int64_t i = 0; i < count; ++i) {
-    cells.boxes.push_back(scan_box(in, "a box"));
+    cells.boxes.push_back(scan_box(in, header.dimensions, "a box"));
     if (!domain.contains(cells.boxes.back()))
       in.fail(fmt::format("box {} {} lies outside the domain {} of level {}", i, text(cells.boxes.back()), text(domain), level));
   }
@@ -216,12 +222,12 @@ void scan_ranges(TextScanner& in, CellHeader& cells, std::int64_t version, std::
 
 }  // namespace
 
-IndexBox scan_box(TextScanner& in, std::string_view what) {
+IndexBox scan_box(TextScanner& in, int dimensions, std::string_view what) {
   IndexBox box;
   in.expect("(", what);
-  box.lower = scan_tuple(in, what, kInt32Min, kInt32Max);
-  box.upper = scan_tuple(in, what, kInt32Min, kInt32Max);
-  if (in.peek() == '(' && scan_tuple(in, what, 0, 1) != Vec3l(0))
+  box.lower = scan_tuple(in, dimensions, what, kInt32Min, kInt32Max);
+  box.upper = scan_tuple(in, dimensions, what, kInt32Min, kInt32Max);
+  if (in.peek() == '(' && scan_tuple(in, dimensions, what, 0, 1) != Vec3l(0))
     in.fail(fmt::format("{} {} is not cell-centred; only cell-centred data can be read", what, text(box)));
   in.expect(")", what);
   if (glm::any(glm::lessThan(box.upper, box.lower))) in.fail(fmt::format("{} {} is empty", what, text(box)));
@@ -237,18 +243,18 @@ PlotHeader scan_header(const fs::path& folder) {
   header.folder = folder;
   scan_version(in);
   scan_fields(in, header);
-  scan_dimension(in, header.fields.size());
+  header.dimensions = scan_dimensions(in, header.fields.size());
   in.real("the time");
   const std::int64_t finest = in.integer("the number of the finest level", 0, kMaxLevels - 1);
-  header.lower = scan_corner(in, "the lower corner of the domain");
-  header.upper = scan_corner(in, "the upper corner of the domain");
+  header.lower = scan_corner(in, header.dimensions, "the lower corner of the domain", 0);
+  header.upper = scan_corner(in, header.dimensions, "the upper corner of the domain", 1);
   if (!glm::all(glm::lessThan(header.lower, header.upper))) in.fail("the upper corner of the domain is not above the lower one");
   scan_domains(in, header, static_cast<std::size_t>(finest + 1));
   for (std::int64_t level = 0; level <= finest; ++level)
     in.integer("the step of a level", std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max());
   for (std::int64_t level = 0; level <= finest; ++level) scan_cell_size(in, header, static_cast<std::size_t>(level));
   scan_coordinate_system(in);
-  for (std::int64_t level = 0; level <= finest; ++level) header.levels.push_back(scan_level_entry(in, folder, level));
+  for (std::int64_t level = 0; level <= finest; ++level) header.levels.push_back(scan_level_entry(in, header, level));
   return header;
 }
 
@@ -261,9 +267,10 @@ CellHeader scan_cell_header(const PlotHeader& header, std::size_t level) {
   const std::int64_t components = in.integer("the number of components", 0, kInt32Max);
   if (components != static_cast<std::int64_t>(header.fields.size()))
     in.fail(fmt::format("{} components, but Header names {} fields", components, header.fields.size()));
-  cells.ghosts = in.peek() == '(' ? scan_tuple(in, "the number of ghost cells", 0, kInt32Max)
+  cells.ghosts = in.peek() == '(' ? scan_tuple(in, header.dimensions, "the number of ghost cells", 0, kInt32Max)
                                   : Vec3l(in.integer("the number of ghost cells", 0, kInt32Max));
-  scan_boxes(in, cells, static_cast<std::int64_t>(level), entry, header.domains[level]);
+  if (header.dimensions == 2) cells.ghosts.z = 0;
+  scan_boxes(in, cells, header, level);
   scan_fabs(in, cells);
   scan_ranges(in, cells, version, components);
   return cells;

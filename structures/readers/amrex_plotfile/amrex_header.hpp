@@ -27,8 +27,9 @@ struct LevelEntry {
 struct PlotHeader {
   std::filesystem::path folder;
   std::vector<std::string> fields;
-  Vec3d lower{0};  ///< world
-  Vec3d upper{1};  ///< world
+  int dimensions = 3;  ///< 2 or 3; along the third axis of 2, boxes have the one cell 0
+  Vec3d lower{0};      ///< world
+  Vec3d upper{1};      ///< world
   std::vector<IndexBox> domains;
   std::vector<int> ratios;
   std::vector<LevelEntry> levels;
@@ -52,6 +53,6 @@ PlotHeader scan_header(const std::filesystem::path& folder);
 CellHeader scan_cell_header(const PlotHeader& header, std::size_t level);
 
 /// `((0,0,0) (15,15,15) (0,0,0))`; the last triple, the centring, may be absent and must be cells.
-IndexBox scan_box(TextScanner& in, std::string_view what);
+IndexBox scan_box(TextScanner& in, int dimensions, std::string_view what);
 
 }  // namespace amrtex

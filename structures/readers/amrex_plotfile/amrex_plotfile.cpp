@@ -8,6 +8,7 @@
 #include "structures/readers/amrex_plotfile/amrex_data.hpp"
 #include "structures/readers/memory_check.hpp"
 #include "structures/readers/reader_tools.hpp"
+#include "structures/readers/slab.hpp"
 #include "structures/readers/wanted_fields.hpp"
 
 namespace amrtex {
@@ -22,14 +23,15 @@ void read_patch(const FabSource& fab, const IndexBox& domain, std::size_t compon
   patch.values = read_components(fab, components, wanted);
 }
 
-CheckedSize cells_of(const std::vector<LevelSources>& sources) {
-  CheckedSize cells;
+/// Of one field.
+CheckedSize bytes_of(const std::vector<LevelSources>& sources) {
+  CheckedSize bytes;
   for (const LevelSources& level : sources)
     for (const FabSource& fab : level.fabs) {
       const Vec3l size = fab.valid.size();
-      cells += CheckedSize(size.x) * size.y * size.z;
+      bytes += CheckedSize(size.x) * size.y * size.z * fab.format.bytes;
     }
-  return cells;
+  return bytes;
 }
 
 void read_levels(const fs::path& path, const PlotHeader& header, const std::vector<LevelSources>& sources,
@@ -56,20 +58,22 @@ bool is_amrex_plotfile(const fs::path& path) {
   return fs::is_regular_file(path / "Header", ignored) || fs::is_directory(path / "Level_0", ignored);
 }
 
-MeshDescription read_amrex_plotfile(const fs::path& path, const std::vector<std::string>& fields) {
+MeshDescription read_amrex_plotfile(const fs::path& path, const FieldChoice& fields) {
   const PlotHeader header = scan_header(path);
-  const std::vector<std::size_t> wanted = wanted_fields(path, header.fields, fields);
+  const std::vector<std::size_t> wanted = fields.among(path, header.fields);
   std::vector<LevelSources> sources;
   for (std::size_t level = 0; level < header.levels.size(); ++level) sources.push_back(locate_level(header, level));
-  require_memory(path, cells_of(sources), wanted.size());
+  require_memory(path, bytes_of(sources), wanted.size(), 1);
   MeshDescription mesh;
   mesh.name = dataset_name(path);
   mesh.domain_lower = header.lower;
   mesh.domain_upper = header.upper;
   mesh.root_cells = Vec3i(header.domains.front().size());
   mesh.ratios = header.ratios;
+  mesh.fields_there = header.fields;
   for (std::size_t component : wanted) mesh.fields.push_back(header.fields[component]);
   read_levels(path, header, sources, wanted, mesh);
+  if (header.dimensions == 2) make_slab(mesh, path);
   return mesh;
 }
 

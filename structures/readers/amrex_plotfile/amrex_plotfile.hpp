@@ -6,14 +6,14 @@
 #include <vector>
 
 #include "structures/mesh/amr_hierarchy.hpp"
+#include "structures/readers/wanted_fields.hpp"
 
 namespace amrtex {
 
 /// True when the folder looks like a plotfile.
 bool is_amrex_plotfile(const std::filesystem::path& path);
 
-/// Reads these fields, or all when none is given.
-MeshDescription read_amrex_plotfile(const std::filesystem::path& path, const std::vector<std::string>& fields);
+MeshDescription read_amrex_plotfile(const std::filesystem::path& path, const FieldChoice& fields);
 
 /// Writes float64 FABs, little endian, Cell_H version 1, one data file a level, into
 /// a folder that must not exist yet; nothing is left behind on failure.

@@ -54,7 +54,7 @@ std::string header_text(const AmrHierarchy& mesh) {
 
 /// Range of the values that are numbers: AMReX reads its tables by stream extraction, which fails on "nan".
 /// Without any number, the range that AMReX takes for empty.
-std::pair<double, double> finite_range(const std::vector<double>& values) {
+std::pair<double, double> finite_range(const CellValues& values) {
   std::pair<double, double> range{std::numeric_limits<double>::max(), std::numeric_limits<double>::lowest()};
   for (double v : values)
     if (std::isfinite(v)) range = {std::min(range.first, v), std::max(range.second, v)};
@@ -70,7 +70,7 @@ std::vector<std::uint64_t> write_level_data(const AmrHierarchy& mesh, int level,
     offsets.push_back(out.written());
     out.write(fmt::format("FAB ((8, (64 11 52 0 1 12 0 1023)),(8, (8 7 6 5 4 3 2 1))){} {}\n", box_text(patch.box),
                           patch.values.size()));
-    for (const auto& values : patch.values) out.write_values(values);
+    for (const CellValues& values : patch.values) out.write_doubles(values);
   }
   out.close();
   return offsets;
@@ -86,7 +86,7 @@ void write_cell_header(const AmrHierarchy& mesh, int level, const std::vector<st
   std::string minima = fmt::format("\n{},{}\n", patches.size(), patches.empty() ? 0 : mesh.fields().size());
   std::string maxima = minima;
   for (const Patch& patch : patches) {
-    for (const auto& values : patch.values) {
+    for (const CellValues& values : patch.values) {
       const auto [lowest, highest] = finite_range(values);
       minima += fmt::format("{:.17e},", lowest);
       maxima += fmt::format("{:.17e},", highest);

@@ -43,7 +43,7 @@ bool is_chombo_hdf5(const fs::path& path) {
   return file.has("Chombo_global") || (file.has("level_0") && file.has_attribute("/", "num_levels"));
 }
 
-MeshDescription read_chombo_hdf5(const fs::path& path, const std::vector<std::string>& fields) {
+MeshDescription read_chombo_hdf5(const fs::path& path, const FieldChoice& fields) {
   refuse_checkpoint(Hdf5File(path));
   const ChomboLayout layout = scan_chombo_layout(path);
   refuse_curved(layout.file);

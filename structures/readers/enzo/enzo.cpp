@@ -163,9 +163,7 @@ void read_file(const Hdf5File& file, const std::vector<const EnzoGrid*>& grids, 
       parallel = parallel && sources.back().values.parallel();
     }
   for_each_index(sources.size(), parallel, [&](std::size_t i) {
-    std::vector<double>& out = patches[i / fields.size()]->values[i % fields.size()];
-    out.resize(static_cast<std::size_t>(sources[i].valid.cells()));
-    sources[i].values.read_box(0, sources[i].stored, sources[i].valid, out);
+    patches[i / fields.size()]->values[i % fields.size()] = sources[i].values.read_box(0, sources[i].stored, sources[i].valid);
   });
 }
 
@@ -176,7 +174,7 @@ void read_values(const EnzoFiles& files, const EnzoParameters& parameters, const
   for (std::size_t i = 0; i < grids.size(); ++i) {
     auto& level = mesh.levels[static_cast<std::size_t>(grids[i].level)];
     place[i] = {static_cast<std::size_t>(grids[i].level), level.size()};
-    level.push_back({boxes[i], std::vector<std::vector<double>>(mesh.fields.size())});
+    level.push_back({boxes[i], std::vector<CellValues>(mesh.fields.size())});
     by_file[grids[i].file].push_back(i);
   }
   for (const auto& [name, members] : by_file) {
@@ -198,7 +196,7 @@ bool is_enzo(const fs::path& path) {
   return says_parameters(path) || says_grids(path) || holds_grids(path);
 }
 
-MeshDescription read_enzo(const fs::path& path, const std::vector<std::string>& fields) {
+MeshDescription read_enzo(const fs::path& path, const FieldChoice& fields) {
   const EnzoFiles files = find_files(path);
   const EnzoParameters parameters = scan_enzo_parameters(files.parameters);
   const std::vector<EnzoGrid> grids = scan_enzo_hierarchy(files.hierarchy, parameters.rank);
@@ -219,7 +217,11 @@ MeshDescription read_enzo(const fs::path& path, const std::vector<std::string>& 
   mesh.levels.resize(static_cast<std::size_t>(finest) + 1);
   const std::vector<std::string> there =
       fields_of(Hdf5File(files.hierarchy.parent_path() / grids.front().file), parameters, grids.front());
-  for (const std::size_t field : wanted_fields(files.parameters, there, fields)) mesh.fields.push_back(there[field]);
+  for (const std::size_t field : fields.among(files.parameters, there)) {
+    mesh.fields.push_back(there[field]);
+    mesh.units.push_back(enzo_unit(parameters, there[field]));
+  }
+  mesh.fields_there = there;
   require_memory(files.parameters, cells, mesh.fields.size());
   read_values(files, parameters, grids, boxes, mesh);
   if (parameters.rank == 2) make_slab(mesh, files.parameters);

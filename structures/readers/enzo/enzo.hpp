@@ -6,13 +6,13 @@
 #include <vector>
 
 #include "structures/mesh/amr_hierarchy.hpp"
+#include "structures/readers/wanted_fields.hpp"
 
 namespace amrtex {
 
 /// True for a folder that holds an output, for its parameter file, its hierarchy, or a file of its values.
 bool is_enzo(const std::filesystem::path& path);
 
-/// Reads these fields, or all when none is given.
-MeshDescription read_enzo(const std::filesystem::path& path, const std::vector<std::string>& fields);
+MeshDescription read_enzo(const std::filesystem::path& path, const FieldChoice& fields);
 
 }  // namespace amrtex

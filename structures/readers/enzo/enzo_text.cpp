@@ -109,13 +109,24 @@ void check_coordinates(const Line& line) {
                           system == 1 ? "spherical" : (system == 2 ? "cylindrical" : "unknown")));
 }
 
-/// The number of `DataLabel[3]`, or -1.
-int label_number(std::string_view key) {
-  constexpr std::string_view kStart = "DataLabel[";
-  if (!key.starts_with(kStart)) return -1;
+/// The number of `DataLabel[3]`, where `name` is what stands in front of it; -1 for other keys.
+int field_number(std::string_view key, std::string_view name) {
+  if (!key.starts_with(name) || !key.substr(name.size()).starts_with('[')) return -1;
   int number = -1;
-  std::from_chars(key.data() + kStart.size(), key.data() + key.size(), number);
+  std::from_chars(key.data() + name.size() + 1, key.data() + key.size(), number);
   return number;
+}
+
+void set_field(const Line& line, EnzoParameters& parameters) {
+  if (const int number = field_number(line.key, "DataLabel"); number >= 0) parameters.labels[number] = std::string(line.value);
+  if (const int number = field_number(line.key, "DataUnits"); number >= 0 && !line.hidden)
+    parameters.units[number] = std::string(line.value);
+  // a comment to the code itself
+  if (const int number = field_number(line.key, "#DataCGSConversionFactor"); number >= 0) {
+    double factor = std::numeric_limits<double>::quiet_NaN();
+    std::from_chars(line.value.data(), line.value.data() + line.value.size(), factor);
+    parameters.factors[number] = factor;
+  }
 }
 
 /// The name of a data file: paths are those of the machine that wrote them, so that only their last part counts.
@@ -233,6 +244,18 @@ void finish_grid(const fs::path& path, int rank, EnzoGrid& grid, const GridLines
 
 }  // namespace
 
+std::string enzo_unit(const EnzoParameters& parameters, const std::string& field) {
+  for (const auto& [number, label] : parameters.labels) {
+    if (label != field) continue;
+    const auto unit = parameters.units.find(number);
+    const auto factor = parameters.factors.find(number);
+    const bool said =
+        unit != parameters.units.end() && unit->second != "none" && unit->second != "(none)" && is_utf8(unit->second);
+    return said && (factor == parameters.factors.end() || factor->second == 1) ? unit->second : "";
+  }
+  return "";
+}
+
 EnzoParameters scan_enzo_parameters(const fs::path& path) {
   EnzoParameters parameters;
   bool cells = false;
@@ -244,7 +267,7 @@ EnzoParameters scan_enzo_parameters(const fs::path& path) {
     }
     if (line.key == "Coordinate") check_coordinates(line);
     if (line.key == "RefineBy") parameters.refine_by = static_cast<int>(line.integer(2, 1 << 16));
-    if (const int number = label_number(line.key); number >= 0) parameters.labels[number] = std::string(line.value);
+    set_field(line, parameters);
     // of the lines whose length depends on it, none stands in front of the rank
     const bool is_cells = line.key == "TopGridDimensions";
     const bool is_lower = line.key == "DomainLeftEdge";

@@ -18,7 +18,12 @@ struct EnzoParameters {
   Vec3d upper{1};                     ///< of the domain, world
   int refine_by = 2;                  ///< between any two levels
   std::map<int, std::string> labels;  ///< names of the fields that the code carries along, in its order
+  std::map<int, std::string> units;   ///< of these fields, where the file names one
+  std::map<int, double> factors;      ///< what makes of a stored value one in the unit, where the file has it
 };
+
+/// Of the field's stored values; empty where the file names none, or where they are to be multiplied first.
+std::string enzo_unit(const EnzoParameters& parameters, const std::string& field);
 
 struct EnzoGrid {
   std::int64_t number = 0;  ///< as in the file, 1 the first

@@ -186,17 +186,17 @@ std::vector<std::vector<Box>> patch_boxes(const fs::path& file, const ExaLeaves&
   return boxes;
 }
 
-std::vector<double> box_values(const Box& box, const std::vector<PlacedCell>& leaves, const std::vector<float>& scalars) {
-  std::vector<double> values(static_cast<std::size_t>(box.cells()), std::numeric_limits<double>::quiet_NaN());
+CellArray<float> box_values(const Box& box, const std::vector<PlacedCell>& leaves, const std::vector<float>& scalars) {
+  CellArray<float> values(static_cast<std::size_t>(box.cells()), std::numeric_limits<float>::quiet_NaN());
   const int length = box.size().x;
-  double* row = values.data();
+  float* row = values.data();
   for (int z = box.lower.z; z < box.upper.z; ++z)
     for (int y = box.lower.y; y < box.upper.y; ++y, row += length) {
       const Vec3i first(box.lower.x, y, z);
       auto leaf = std::lower_bound(leaves.begin(), leaves.end(), first,
                                    [](const PlacedCell& a, const Vec3i& b) { return array_order(a.cell, b); });
       for (; leaf != leaves.end() && leaf->cell.z == z && leaf->cell.y == y && leaf->cell.x < box.upper.x; ++leaf)
-        row[leaf->cell.x - box.lower.x] = static_cast<double>(scalars[leaf->scalar]);
+        row[leaf->cell.x - box.lower.x] = scalars[leaf->scalar];
     }
   return values;
 }

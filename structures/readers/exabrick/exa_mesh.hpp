@@ -33,6 +33,6 @@ ExaLeaves place_leaves(const std::filesystem::path& file, ExaCells cells);
 std::vector<std::vector<Box>> patch_boxes(const std::filesystem::path& file, const ExaLeaves& leaves);
 
 /// The values of a box, x fastest; NaN where a cell is no leaf.
-std::vector<double> box_values(const Box& box, const std::vector<PlacedCell>& leaves, const std::vector<float>& scalars);
+CellArray<float> box_values(const Box& box, const std::vector<PlacedCell>& leaves, const std::vector<float>& scalars);
 
 }  // namespace amrtex

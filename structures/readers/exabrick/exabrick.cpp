@@ -16,12 +16,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<ExaField> fields_to_read(const fs::path& path, const std::vector<ExaField>& all,
-                                     const std::vector<std::string>& names) {
+std::vector<ExaField> fields_to_read(const fs::path& path, const std::vector<ExaField>& all, const FieldChoice& names) {
   std::vector<std::string> there;
   for (const ExaField& field : all) there.push_back(field.name);
   std::vector<ExaField> wanted;
-  for (const std::size_t i : wanted_fields(path, there, names)) wanted.push_back(all[i]);
+  for (const std::size_t i : names.among(path, there)) wanted.push_back(all[i]);
   return wanted;
 }
 
@@ -77,7 +76,7 @@ bool is_exabrick(const fs::path& path) {
   return bytes > 0 && bytes % sizeof(ExaCell) == 0 && fs::file_size(scalars, ignored) == bytes / sizeof(ExaCell) * sizeof(float);
 }
 
-MeshDescription read_exabrick(const fs::path& path, const std::vector<std::string>& fields) {
+MeshDescription read_exabrick(const fs::path& path, const FieldChoice& fields) {
   const ExaFiles files = find_exa_files(path);
   const std::vector<ExaField> wanted = fields_to_read(path, files.fields, fields);
   const ExaLeaves leaves = place_leaves(files.geometry, load_exa_cells(files, common_count(wanted)));
@@ -86,6 +85,7 @@ MeshDescription read_exabrick(const fs::path& path, const std::vector<std::strin
   mesh.name = dataset_name(path);
   set_domain(leaves, files.remap, mesh);
   for (const ExaField& field : wanted) mesh.fields.push_back(field.name);
+  for (const ExaField& field : files.fields) mesh.fields_there.push_back(field.name);
   CheckedSize cells;
   for (const auto& level : boxes) {
     std::vector<Patch>& patches = mesh.levels.emplace_back();
@@ -94,7 +94,7 @@ MeshDescription read_exabrick(const fs::path& path, const std::vector<std::strin
       cells += box.cells();
     }
   }
-  require_memory(path, cells, wanted.size());
+  require_memory(path, cells, wanted.size(), sizeof(float));
   for (std::size_t l = 1; l < leaves.widths.size(); ++l) mesh.ratios.push_back(leaves.widths[l - 1] / leaves.widths[l]);
   fill_patches(wanted, leaves, mesh);
   return mesh;

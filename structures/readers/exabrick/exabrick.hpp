@@ -6,14 +6,14 @@
 #include <vector>
 
 #include "structures/mesh/amr_hierarchy.hpp"
+#include "structures/readers/wanted_fields.hpp"
 
 namespace amrtex {
 
 /// True for one of these files, and for a folder that holds one data set of them.
 bool is_exabrick(const std::filesystem::path& path);
 
-/// Reads these fields, or all when none is given.
-MeshDescription read_exabrick(const std::filesystem::path& path, const std::vector<std::string>& fields);
+MeshDescription read_exabrick(const std::filesystem::path& path, const FieldChoice& fields);
 
 /// The leaf cells, values as float. One field: `name.cells` and `name.scalars`; several: `name.cells` and
 /// `name.<field>.scalars`. No file of these names may exist; nothing is left behind on failure.

@@ -145,20 +145,28 @@ Hdf5Numbers open_field(const Hdf5File& file, const FlashParameters& parameters, 
 }
 
 /// Reads many blocks at a time, since each of them alone is small.
-void read_field(const Hdf5Numbers& values, const std::vector<Patch*>& patches, std::size_t field) {
+template <class T>
+void read_blocks_of(const Hdf5Numbers& values, const std::vector<Patch*>& patches, std::size_t field) {
   constexpr std::size_t kValuesAtOnce = std::size_t{1} << 16;
   const auto each = static_cast<std::size_t>(values.count() / patches.size());
   const std::size_t at_once = std::max<std::size_t>(1, kValuesAtOnce / each);
   for_each_index((patches.size() + at_once - 1) / at_once, values.parallel(), [&](std::size_t group) {
     const std::size_t from = group * at_once;
     const std::size_t count = std::min(at_once, patches.size() - from);
-    std::vector<double> buffer(count * each);
-    values.read(from * each, buffer);
+    CellArray<T> buffer(count * each);
+    values.read(from * each, std::span(buffer));
     for (std::size_t i = 0; i < count; ++i) {
-      const auto begin = buffer.begin() + static_cast<std::ptrdiff_t>(i * each);
-      patches[from + i]->values[field].assign(begin, begin + static_cast<std::ptrdiff_t>(each));
+      const T* const begin = buffer.data() + i * each;
+      patches[from + i]->values[field] = CellArray<T>(begin, begin + each);
     }
   });
+}
+
+void read_field(const Hdf5Numbers& values, const std::vector<Patch*>& patches, std::size_t field) {
+  if (values.type() == RealType::float32)
+    read_blocks_of<float>(values, patches, field);
+  else
+    read_blocks_of<double>(values, patches, field);
 }
 
 }  // namespace
@@ -169,14 +177,14 @@ bool is_flash_hdf5(const fs::path& path) {
   return file.has("sim info") || (file.has("file format version") && (file.has("refine level") || file.has("unknown names")));
 }
 
-MeshDescription read_flash_hdf5(const fs::path& path, const std::vector<std::string>& fields) {
+MeshDescription read_flash_hdf5(const fs::path& path, const FieldChoice& fields) {
   const Hdf5File file(path);
   const FlashParameters parameters = scan_flash_parameters(file);
   if (!file.has("refine level")) file.fail("refine level", "no tree of blocks; files of particles alone cannot be read");
   const Blocks blocks = read_blocks(file, parameters.dimensions);
   const Domain domain = domain_of(file, parameters, blocks);
   const FieldNames names = scan_names(file);
-  const std::vector<std::size_t> wanted = wanted_fields(path, names.fields, fields);
+  const std::vector<std::size_t> wanted = fields.among(path, names.fields);
   MeshDescription mesh;
   mesh.name = dataset_name(path);
   mesh.domain_lower = domain.lower;
@@ -185,19 +193,21 @@ MeshDescription read_flash_hdf5(const fs::path& path, const std::vector<std::str
   const auto finest = static_cast<std::size_t>(*std::max_element(blocks.level.begin(), blocks.level.end()));
   mesh.ratios.assign(finest, 2);
   mesh.levels.resize(finest + 1);
+  mesh.fields_there = names.fields;
   std::vector<Hdf5Numbers> sources;
   for (const std::size_t field : wanted) {
     mesh.fields.push_back(names.fields[field]);
     sources.push_back(open_field(file, parameters, blocks.count(), names.fields[field], names.sets[field]));
   }
   const std::int64_t cells = Box{Vec3i(0), parameters.block_cells}.cells();
-  require_memory(path, CheckedSize::of(blocks.count()) * cells, wanted.size());
+  for (const Hdf5Numbers& source : sources)
+    require_memory(path, CheckedSize::of(blocks.count()) * cells, wanted.size(), bytes_of(source.type()));
   std::vector<Patch*> patches(blocks.count());
   std::vector<std::size_t> place(blocks.count());
   for (std::size_t b = 0; b < blocks.count(); ++b) {
     auto& level = mesh.levels[static_cast<std::size_t>(blocks.level[b])];
     place[b] = level.size();
-    level.push_back({box_of(file, parameters, domain, blocks, b), std::vector<std::vector<double>>(wanted.size())});
+    level.push_back({box_of(file, parameters, domain, blocks, b), std::vector<CellValues>(wanted.size())});
   }
   for (std::size_t b = 0; b < blocks.count(); ++b) patches[b] = &mesh.levels[static_cast<std::size_t>(blocks.level[b])][place[b]];
   for (std::size_t f = 0; f < sources.size(); ++f) read_field(sources[f], patches, f);

@@ -6,13 +6,13 @@
 #include <vector>
 
 #include "structures/mesh/amr_hierarchy.hpp"
+#include "structures/readers/wanted_fields.hpp"
 
 namespace amrtex {
 
 /// True for an HDF5 file with a tree of blocks and a version as FLASH writes them.
 bool is_flash_hdf5(const std::filesystem::path& path);
 
-/// Reads these fields, or all when none is given.
-MeshDescription read_flash_hdf5(const std::filesystem::path& path, const std::vector<std::string>& fields);
+MeshDescription read_flash_hdf5(const std::filesystem::path& path, const FieldChoice& fields);
 
 }  // namespace amrtex

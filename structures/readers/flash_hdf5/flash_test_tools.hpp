@@ -60,7 +60,7 @@ inline void write_flash(const std::filesystem::path& path, const MeshDescription
         bounds.push_back(mesh.domain_lower[axis] + patch.box.upper[axis] * spacing[axis]);
       }
       for (std::size_t f = 0; f < mesh.fields.size(); ++f)
-        values[f].insert(values[f].end(), patch.values[f].begin(), patch.values[f].end());
+        for (const double v : patch.values[f]) values[f].push_back(v);
     }
     spacing /= 2.0;
   }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <fstream>
@@ -12,6 +13,7 @@
 #include "structures/mesh/npz_file.hpp"
 #include "structures/mesh/quoted.hpp"
 #include "structures/mesh/unfinished_folder.hpp"
+#include "structures/readers/memory_check.hpp"
 #include "structures/readers/reader_tools.hpp"
 #include "structures/readers/wanted_fields.hpp"
 
@@ -28,46 +30,56 @@ constexpr int kMostLevel = 63;
 /// The arrays of a file, each of the shape and type that it has to have.
 class ArrayReader {
  public:
-  ArrayReader(const fs::path& path) : path_(path), arrays_(read_npz(path)) {}
+  explicit ArrayReader(const fs::path& path) : path_(path), file_(path) {}
 
   [[noreturn]] void refuse(const std::string& what) const { throw Error(fmt::format("{}: {}", path_.string(), what)); }
 
+  bool has(const std::string& name) const { return file_.has(name); }
   /// Whole numbers of 32 or 64 bits.
   std::vector<std::int64_t> integers(const std::string& name, const Shape& shape) const {
-    const NpyArray& array = find(name, shape);
+    const NpyHeader header = find(name, shape);
+    if (header.type != "<i4" && header.type != "<i8")
+      refuse(fmt::format("the array {} has type {}; accepted: <i4, <i8", name, header.type));
+    const NpyArray array = file_.read(name);
     if (array.type == "<i8") return values<std::int64_t>(array);
-    if (array.type != "<i4") refuse(fmt::format("the array {} has type {}; accepted: <i4, <i8", name, array.type));
     const auto small = values<std::int32_t>(array);
     return {small.begin(), small.end()};
   }
   std::vector<double> reals(const std::string& name, const Shape& shape) const {
-    const NpyArray& array = find(name, shape);
-    if (array.type == "<f8") return values<double>(array);
-    if (array.type != "<f4") refuse(fmt::format("the array {} has type {}; accepted: <f4, <f8", name, array.type));
+    const RealType type = real_type(name, shape);
+    const NpyArray array = file_.read(name);
+    if (type == RealType::float64) return values<double>(array);
     const auto small = values<float>(array);
     return {small.begin(), small.end()};
   }
+  RealType real_type(const std::string& name, const Shape& shape) const {
+    const NpyHeader header = find(name, shape);
+    if (header.type != "<f8" && header.type != "<f4")
+      refuse(fmt::format("the array {} has type {}; accepted: <f4, <f8", name, header.type));
+    return header.type == "<f4" ? RealType::float32 : RealType::float64;
+  }
   std::string text(const std::string& name) const {
-    const NpyArray& array = find(name, {length(name)});
-    if (array.type != "|u1") refuse(fmt::format("the array {} has type {}; accepted: |u1", name, array.type));
-    return array.bytes;
+    const NpyHeader header = find(name, {length(name)});
+    if (header.type != "|u1") refuse(fmt::format("the array {} has type {}; accepted: |u1", name, header.type));
+    return file_.read(name).bytes;
   }
   /// Of the first axis.
   std::int64_t length(const std::string& name) const {
-    const auto found = arrays_.find(name);
-    if (found == arrays_.end()) refuse(fmt::format("holds no array {}; it is no mesh", quote(name)));
-    if (found->second.shape.empty()) refuse(fmt::format("the array {} is a single number", name));
-    return found->second.shape.front();
+    if (!file_.has(name)) refuse(fmt::format("holds no array {}; it is no mesh", quote(name)));
+    const NpyHeader header = file_.header(name);
+    if (header.shape.empty()) refuse(fmt::format("the array {} is a single number", name));
+    return header.shape.front();
   }
+  const NpzFile& file() const { return file_; }
 
  private:
-  const NpyArray& find(const std::string& name, const Shape& shape) const {
+  NpyHeader find(const std::string& name, const Shape& shape) const {
     static_cast<void>(length(name));
-    const NpyArray& array = arrays_.at(name);
-    if (array.shape != shape)
+    NpyHeader header = file_.header(name);
+    if (header.shape != shape)
       refuse(
-          fmt::format("the array {} has shape ({}); expected ({})", name, fmt::join(array.shape, ", "), fmt::join(shape, ", ")));
-    return array;
+          fmt::format("the array {} has shape ({}); expected ({})", name, fmt::join(header.shape, ", "), fmt::join(shape, ", ")));
+    return header;
   }
   template <class T>
   static std::vector<T> values(const NpyArray& array) {
@@ -77,7 +89,7 @@ class ArrayReader {
   }
 
   fs::path path_;
-  Arrays arrays_;
+  NpzFile file_;
 };
 
 std::vector<std::string> lines_of(const std::string& text) {
@@ -129,33 +141,76 @@ bool is_npz_mesh(const fs::path& path) {
   return std::string_view(magic.data(), magic.size()) == "PK\x03\x04";
 }
 
-MeshDescription read_npz_mesh(const fs::path& path, const std::vector<std::string>& fields) {
-  const ArrayReader in(path);
-  MeshDescription mesh = read_frame(in);
-  mesh.name = dataset_name(path);
+namespace {
+
+/// Patches without values, in the order of the file, each of them in its level.
+std::vector<Patch*> place_patches(const ArrayReader& in, std::int64_t cells, MeshDescription& mesh) {
   const std::int64_t patches = in.length("levels");
   const auto levels = in.integers("levels", {patches});
   const auto boxes = in.integers("boxes", {patches, 2, 3});
-  const std::vector<std::string> names = lines_of(in.text("fields"));
-  const std::int64_t cells = in.length("leaf");  // one number a stored cell
-  const auto values = in.reals("values", {std::ssize(names), cells});
-  const std::vector<std::size_t> wanted = wanted_fields(path, names, fields);
-  for (const std::size_t field : wanted) mesh.fields.push_back(names[field]);
+  std::vector<std::pair<std::size_t, std::size_t>> places;  // level and patch
   std::int64_t at = 0;
   for (std::size_t k = 0; k < levels.size(); ++k) {
     if (levels[k] < 0 || levels[k] >= std::ssize(mesh.levels))
       in.refuse(fmt::format("patch {} is of level {}; there are {} levels", k, levels[k], mesh.levels.size()));
-    Patch patch{box_of(in, &boxes[6 * k]), {}};
-    const std::int64_t count = patch.box.cells();
+    auto& level = mesh.levels[static_cast<std::size_t>(levels[k])];
+    level.push_back({box_of(in, &boxes[6 * k]), std::vector<CellValues>(mesh.fields.size())});
+    const std::int64_t count = level.back().box.cells();
     if (count > cells - at) in.refuse(fmt::format("the boxes hold more cells than there are values, {}", cells));
-    for (const std::size_t field : wanted) {
-      const auto begin = values.begin() + static_cast<std::ptrdiff_t>(field) * cells + at;
-      patch.values.emplace_back(begin, begin + count);
-    }
     at += count;
-    mesh.levels[static_cast<std::size_t>(levels[k])].push_back(std::move(patch));
+    places.emplace_back(static_cast<std::size_t>(levels[k]), level.size() - 1);
   }
   if (at != cells) in.refuse(fmt::format("the boxes hold {} cells, but there are {} values", at, cells));
+  std::vector<Patch*> in_order;
+  for (const auto& [level, patch] : places) in_order.push_back(&mesh.levels[level][patch]);
+  return in_order;
+}
+
+/// Passes over the rows of other fields.
+void read_values(const ArrayReader& in, RealType type, std::size_t fields, std::int64_t cells,
+                 const std::vector<std::size_t>& wanted, const std::vector<Patch*>& patches) {
+  const auto row_bytes = static_cast<std::uint64_t>(cells) * bytes_of(type);
+  in.file().stream("values", [&](const NpzFile::NextBytes& read) {
+    for (std::size_t field = 0; field < fields; ++field) {
+      const auto found = std::find(wanted.begin(), wanted.end(), field);
+      if (found == wanted.end()) {
+        read(nullptr, row_bytes);
+        continue;
+      }
+      for (Patch* patch : patches) {
+        CellValues values(type, static_cast<std::size_t>(patch->box.cells()));
+        values.visit_stored([&](auto& stored) { read(stored.data(), stored.size() * sizeof(stored[0])); });
+        patch->values[static_cast<std::size_t>(found - wanted.begin())] = std::move(values);
+      }
+    }
+  });
+  for (std::size_t i = 0; i < wanted.size(); ++i)  // a field that is asked for twice
+    if (const auto first = std::find(wanted.begin(), wanted.end(), wanted[i]);
+        first - wanted.begin() < static_cast<std::ptrdiff_t>(i))
+      for (Patch* patch : patches) patch->values[i] = patch->values[static_cast<std::size_t>(first - wanted.begin())];
+}
+
+}  // namespace
+
+MeshDescription read_npz_mesh(const fs::path& path, const FieldChoice& fields) {
+  const ArrayReader in(path);
+  MeshDescription mesh = read_frame(in);
+  mesh.name = dataset_name(path);
+  mesh.fields_there = lines_of(in.text("fields"));
+  const std::int64_t cells = in.length("leaf");  // one number a stored cell
+  const RealType type = in.real_type("values", {std::ssize(mesh.fields_there), cells});
+  std::vector<std::string> units(mesh.fields_there.size());
+  if (in.has("units")) units = lines_of(in.text("units"));
+  if (units.size() != mesh.fields_there.size())
+    in.refuse(fmt::format("{} units for {} fields", units.size(), mesh.fields_there.size()));
+  const std::vector<std::size_t> wanted = fields.among(path, mesh.fields_there);
+  for (const std::size_t field : wanted) {
+    mesh.fields.push_back(mesh.fields_there[field]);
+    mesh.units.push_back(units[field]);
+  }
+  const std::vector<Patch*> patches = place_patches(in, cells, mesh);
+  require_memory(path, cells, wanted.size(), bytes_of(type));
+  read_values(in, type, mesh.fields_there.size(), cells, wanted, patches);
   return mesh;
 }
 
@@ -166,6 +221,8 @@ NpyArray array_of(const char* type, Shape shape, const std::vector<T>& values) {
   return NpyArray::of<T>(type, std::move(shape), values);
 }
 
+std::string one_line_of(const std::string& text) { return text.substr(0, text.find('\n')); }
+
 /// What is not the patches' own.
 Arrays frame_of(const AmrHierarchy& mesh) {
   std::vector<std::int32_t> ratios;
@@ -174,10 +231,14 @@ Arrays frame_of(const AmrHierarchy& mesh) {
   const Vec3d lower = mesh.domain_lower();
   const Vec3d upper = mesh.domain_upper();
   const std::string names = fmt::format("{}", fmt::join(mesh.fields(), "\n"));
+  std::string units;
+  for (int field = 0; field < std::ssize(mesh.fields()); ++field)
+    units += (field > 0 ? "\n" : "") + one_line_of(mesh.unit(field));
   return {{"ratios", array_of<std::int32_t>("<i4", {std::ssize(ratios)}, ratios)},
           {"root_cells", array_of<std::int32_t>("<i4", {3}, {root.x, root.y, root.z})},
           {"domain", array_of<double>("<f8", {2, 3}, {lower.x, lower.y, lower.z, upper.x, upper.y, upper.z})},
-          {"fields", NpyArray{"|u1", {std::ssize(names)}, names}}};
+          {"fields", NpyArray{"|u1", {std::ssize(names)}, names}},
+          {"units", NpyArray{"|u1", {std::ssize(units)}, units}}};
 }
 
 }  // namespace
@@ -205,7 +266,8 @@ void write_npz_mesh(const AmrHierarchy& mesh, const fs::path& path) {
   for (std::size_t field = 0; field < mesh.fields().size(); ++field)
     for (int level = 0; level < mesh.level_count(); ++level)
       for (const Patch& patch : mesh.patches(level))
-        values.append(reinterpret_cast<const char*>(patch.values[field].data()), patch.values[field].size() * sizeof(double));
+        for (const double value : patch.values[field].doubles())
+          values.append(reinterpret_cast<const char*>(&value), sizeof value);
   const std::int64_t cells = std::ssize(leaf);
   arrays["levels"] = array_of<std::int32_t>("<i4", {std::ssize(levels)}, levels);
   arrays["boxes"] = array_of<std::int32_t>("<i4", {std::ssize(levels), 2, 3}, boxes);

@@ -6,14 +6,14 @@
 #include <vector>
 
 #include "structures/mesh/amr_hierarchy.hpp"
+#include "structures/readers/wanted_fields.hpp"
 
 namespace amrtex {
 
 /// True for a zip file.
 bool is_npz_mesh(const std::filesystem::path& path);
 
-/// Reads these fields, or all when none is given.
-MeshDescription read_npz_mesh(const std::filesystem::path& path, const std::vector<std::string>& fields);
+MeshDescription read_npz_mesh(const std::filesystem::path& path, const FieldChoice& fields);
 
 /// Throws Error where there is something of this name; nothing is left behind on failure.
 void write_npz_mesh(const AmrHierarchy& hierarchy, const std::filesystem::path& path);

@@ -159,19 +159,23 @@ void add_parts(const Box& box, std::vector<Patch>& patches) {
   });
 }
 
-std::vector<Patch> patches_of(std::vector<Vec3i> blocks, const CoarseCells& cells, int edge) {
+std::vector<Patch> patches_of(std::vector<Vec3i> blocks, const CoarseCells& cells, int edge, RealType type) {
   std::sort(blocks.begin(), blocks.end(), array_order);
   std::vector<Patch> patches;
   for (const Box& box : boxes_of_cells(blocks)) add_parts(intersection(box.refined(edge), cells.box()), patches);
   tbb::parallel_for(std::size_t{0}, patches.size(), [&](std::size_t k) {
     Patch& patch = patches[k];
-    auto& values = patch.values.emplace_back();
-    values.reserve(static_cast<std::size_t>(patch.box.cells()));
-    for (int z = patch.box.lower.z; z < patch.box.upper.z; ++z)
-      for (int y = patch.box.lower.y; y < patch.box.upper.y; ++y) {
-        const double* row = &cells.mean[cells.box().offset({patch.box.lower.x, y, z})];
-        values.insert(values.end(), row, row + patch.box.size().x);
-      }
+    CellValues values(type, static_cast<std::size_t>(patch.box.cells()));
+    values.visit_stored([&](auto& stored) {
+      auto out = stored.begin();
+      for (int z = patch.box.lower.z; z < patch.box.upper.z; ++z)
+        for (int y = patch.box.lower.y; y < patch.box.upper.y; ++y) {
+          const double* row = &cells.mean[cells.box().offset({patch.box.lower.x, y, z})];
+          out = std::transform(row, row + patch.box.size().x, out,
+                               [](double v) { return static_cast<typename std::decay_t<decltype(stored)>::value_type>(v); });
+        }
+    });
+    patch.values.push_back(std::move(values));
   });
   return patches;
 }
@@ -212,13 +216,15 @@ MeshDescription coarsen_volume(Volume volume, const CoarsenCriterion& criterion)
   MeshDescription mesh;
   mesh.name = volume.name;
   mesh.fields = {volume.field};
+  mesh.units = {volume.unit};
   const int widest = 1 << chooser.coarsest();
   mesh.root_cells = ceil_div(volume.cells, widest);
   mesh.ratios.assign(chooser.coarsest(), 2);
   mesh.domain_lower = volume.lower;
   mesh.domain_upper = volume.lower + Vec3d(mesh.root_cells) * static_cast<double>(widest) * volume.spacing;
   for (std::size_t level = chooser.coarsest() + 1; level-- > 0;)
-    mesh.levels.push_back(patches_of(std::move(blocks[level]), levels[level], criterion.block));
+    mesh.levels.push_back(patches_of(std::move(blocks[level]), levels[level], criterion.block,
+                                     level == 0 ? volume.type : RealType::float64));  // means are no values of the file
   return mesh;
 }
 

@@ -13,9 +13,11 @@ struct Volume {
   std::string name;  ///< of the data set
   std::string field;
   Vec3i cells{1};
-  Vec3d lower{0};              ///< world
-  Vec3d spacing{1};            ///< world, a cell
-  std::vector<double> values;  ///< x fastest
+  Vec3d lower{0};                     ///< world
+  Vec3d spacing{1};                   ///< world, a cell
+  std::vector<double> values;         ///< x fastest
+  RealType type = RealType::float64;  ///< holds each of them exactly
+  std::string unit = {};              ///< of the values; empty where nothing says it
 };
 
 /// When a block becomes coarse. A block of level l is `block` cells of that level along each axis.

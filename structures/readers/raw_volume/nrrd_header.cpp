@@ -180,7 +180,14 @@ Vec3d spacing_of(const NrrdHeader& header) {
   return spacing;
 }
 
+std::string without_quotes(const std::string& text) {
+  const bool quoted = text.size() > 1 && text.front() == '"' && text.back() == '"';
+  const std::string inner = quoted ? text.substr(1, text.size() - 2) : text;
+  return is_utf8(inner) ? inner : "";
+}
+
 void set_place(const NrrdHeader& header, VolumeFile& file) {
+  if (header.has("sample units")) file.unit = without_quotes(header.get("sample units"));
   file.spacing = spacing_of(header);
   if (!header.has("space origin")) return;
   const std::vector<double> origin = header.numbers("space origin");

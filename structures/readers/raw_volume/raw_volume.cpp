@@ -46,7 +46,8 @@ VolumeFile describe(const fs::path& path) {
 }
 
 Volume load(const fs::path& path, const VolumeFile& file) {
-  return {dataset_name(path), file.field, file.cells, file.lower, file.spacing, load_values(file)};
+  return {dataset_name(path),      file.field, file.cells, file.lower, file.spacing, load_values(file),
+          real_type_of(file.type), file.unit};
 }
 
 }  // namespace
@@ -55,9 +56,9 @@ bool is_raw_volume(const fs::path& path) { return kind_of(path) != Kind::none; }
 
 Volume read_volume(const fs::path& path) { return load(path, describe(path)); }
 
-MeshDescription read_raw_volume(const fs::path& path, const std::vector<std::string>& fields) {
+MeshDescription read_raw_volume(const fs::path& path, const FieldChoice& fields) {
   const VolumeFile file = describe(path);
-  static_cast<void>(wanted_fields(path, {file.field}, fields));
+  static_cast<void>(fields.among(path, {file.field}));
   return coarsen_volume(load(path, file));
 }
 

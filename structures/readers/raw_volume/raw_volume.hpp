@@ -7,6 +7,7 @@
 
 #include "structures/mesh/amr_hierarchy.hpp"
 #include "structures/readers/raw_volume/coarsen_volume.hpp"
+#include "structures/readers/wanted_fields.hpp"
 
 namespace amrtex {
 
@@ -17,6 +18,6 @@ bool is_raw_volume(const std::filesystem::path& path);
 Volume read_volume(const std::filesystem::path& path);
 
 /// A volume as a mesh, by the criterion's defaults. `fields` may name its one field.
-MeshDescription read_raw_volume(const std::filesystem::path& path, const std::vector<std::string>& fields);
+MeshDescription read_raw_volume(const std::filesystem::path& path, const FieldChoice& fields);
 
 }  // namespace amrtex

@@ -195,6 +195,10 @@ int bytes_of(ValueType type) {
   return 0;
 }
 
+RealType real_type_of(ValueType type) {
+  return bytes_of(type) <= 2 || type == ValueType::f4 ? RealType::float32 : RealType::float64;
+}
+
 Vec3i volume_shape(const fs::path& path, const std::vector<std::int64_t>& sizes) {
   if (sizes.size() != 3) refuse(path, fmt::format("{} axes; a volume has 3", sizes.size()));
   for (const std::int64_t n : sizes)

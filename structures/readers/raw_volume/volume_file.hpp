@@ -8,12 +8,15 @@
 #include <string_view>
 #include <vector>
 
+#include "structures/mesh/cell_values.hpp"
 #include "structures/mesh/spaces.hpp"
 
 namespace amrtex {
 
 enum class ValueType { u1, i1, u2, i2, u4, i4, f4, f8 };
 int bytes_of(ValueType type);
+/// What holds every number of the type exactly.
+RealType real_type_of(ValueType type);
 
 struct VolumeFile {
   std::filesystem::path data;      ///< holds the values
@@ -28,6 +31,7 @@ struct VolumeFile {
   Vec3d lower{0};    ///< world
   Vec3d spacing{1};  ///< world
   std::string field;
+  std::string unit;  ///< of the values; empty where nothing says it
 };
 
 /// What `name_WxHxD_type.raw` says; nullopt for other names. Throws Error for a name of this form with a type or a shape

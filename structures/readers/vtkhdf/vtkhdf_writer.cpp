@@ -130,7 +130,7 @@ class VtkhdfFile {
     require(*data >= 0, quote(name));
     hsize_t at = 0;
     for (const Patch& patch : mesh.patches(level)) {
-      const auto& values = patch.values[field];
+      const std::vector<double> values = patch.values[field].doubles();
       const hsize_t count = values.size();
       const Handle part(H5Screate_simple(1, &count, nullptr), H5Sclose);
       H5Sselect_hyperslab(*space, H5S_SELECT_SET, &at, nullptr, &count, nullptr);
