@@ -20,7 +20,7 @@ case ${1:-} in
 esac
 mesa=(libgl1-mesa-dri libegl-mesa0 libglx-mesa0 mesa-vulkan-drivers libvulkan1 libgbm1)
 # Mesa 25.1 dropped OSMesa; where a distribution has no package, the EGL path alone remains.
-osmesa=libosmesa6-dev
+osmesa=libosmesa6
 
 run_as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
 installed() { dpkg-query -W -f='${Status}' "$1" 2>/dev/null | grep -q '^install ok installed$'; }

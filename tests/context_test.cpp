@@ -107,9 +107,13 @@ TEST(ContextA0Probe, DescribesTheContext) {
 }
 
 TEST(ContextKinds, AnUnknownNameNamesTheKnownOnes) {
-  EXPECT_EQ(parse_context_kind("osmesa"), ContextKind::osmesa);
-  EXPECT_THROW(parse_context_kind("glx"), UsageError);
-  expect_contains(error_of([] { parse_context_kind("glx"); }), "egl, egl_device, osmesa");
+  EXPECT_EQ(parse_context("osmesa").kind, ContextKind::osmesa);
+  EXPECT_EQ(parse_context("egl_device:2").device, 2);
+  EXPECT_EQ(parse_context("egl_device:2").name(), "egl_device:2");
+  for (const char* wrong : {"glx", "egl_device:", "egl_device:-1", "egl_device:1x", "egl_device:99999999999", "egl:0"}) {
+    EXPECT_THROW(parse_context(wrong), UsageError) << wrong;
+    expect_contains(error_of([&] { parse_context(wrong); }), "egl, egl_device, osmesa");
+  }
 }
 
 class ContextTest : public testing::TestWithParam<ContextKind> {

@@ -76,7 +76,7 @@ PointMeasurer::PointMeasurer(const Experiment& experiment, std::size_t dataset, 
 
 Context& PointMeasurer::context() {
   if (!context_) {
-    context_ = make_context(parse_context_kind(options_.context));
+    context_ = make_context(parse_context(options_.context));
     baseline_ = std::make_unique<Baseline>(experiment_, data_.dataset(), data_.mesh(), *context_);
   }
   return *context_;
