@@ -219,7 +219,7 @@ void PointMeasurer::add_times(Json& record, const RenderPoint& render, Consumer&
   options_.phase(Phase::other);
   Consumer* const beside = baseline_->beside(render);
   options_.phase(Phase::drawing);
-  const FrameTimes times = time_point(render, consumer, beside, context().info().software);
+  const FrameTimes times = time_point(render, consumer, beside, context());
   double frames = 0;
   for (const Json& ms : times.frame.at("all_wall_ms")) frames += ms.get<double>() / 1000;
   shares_.add(Share::frames, frames);

@@ -19,7 +19,7 @@ struct WorkCounts {
 
 struct FrameTime {
   double wall_ms = 0;  ///< from before the host's own work for the frame until glFinish
-  double gpu_ms = 0;   ///< GL_TIME_ELAPSED
+  double gpu_ms = 0;   ///< GL_TIME_ELAPSED; NaN without a timer
 };
 
 class Consumer {
@@ -36,6 +36,9 @@ class Consumer {
   virtual bool transfer_exact() const = 0;
   /// That finding where rays meet the scene's triangles took, before the first draw; 0 where it has none.
   virtual double triangle_seconds() const { return 0; }
+  /// Draws so many times inside one GL_TIME_ELAPSED query, with nothing read back; milliseconds a draw. With several draws it is
+  /// a throughput: the end of one may overlap the next. NaN without a timer.
+  virtual double gpu_ms_a_draw(int draws) = 0;
 };
 
 }  // namespace amrtex

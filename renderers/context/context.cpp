@@ -261,12 +261,15 @@ void Context::install_debug_output() {
 
 void Context::check(std::string_view what) {
   std::vector<std::string> problems = log_->take_fatal();
+  bool out_of_memory = false;
   // bounded: a lost context may report its error for ever
   for (int i = 0; i < 16; ++i) {
     const GLenum error = gl_->GetError();
     if (error == GL_NO_ERROR) break;
     problems.emplace_back(gl_error_name(error));
+    out_of_memory = out_of_memory || error == GL_OUT_OF_MEMORY;
   }
+  if (out_of_memory) throw BudgetError(fmt::format("context {}, {}: {}", info_.kind, what, fmt::join(problems, "; ")));
   if (!problems.empty()) throw Error(fmt::format("context {}, {}: {}", info_.kind, what, fmt::join(problems, "; ")));
 }
 

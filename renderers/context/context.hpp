@@ -72,6 +72,7 @@ class Context {
   /// Bytes that the driver says are free on the GPU now; 0 = it cannot be asked.
   std::int64_t free_memory_bytes();
 
+  /// Throws BudgetError where GL has no memory left, which costs an object and not the context.
   /// Throws Error with every fatal message and GL error since the last call; `what`
   /// says what was being done. Fatal are errors and messages of high severity,
   /// except those of the shader compiler, which Program throws with file names.
