@@ -160,6 +160,7 @@ int doctor(bool json) {
     if (!json) print_context(fmt::format("context {}", way.name), p);
   }
   all["devices"] = probe_all_devices(!json);
+  for (const Json& device : all["devices"]) any = any || device.at("available").get<bool>();
   if (json) fmt::print("{}\n", all.dump(2));
   return any ? 0 : 1;
 }
