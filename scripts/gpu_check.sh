@@ -33,7 +33,9 @@ for place in "$root/../../bin/amrtex" "$root/build/release/amrtex" "$root/build/
 done
 [ -x "$amrtex" ] || refuse "no program: looked in bin/ of the bundle and in build/release; build it, or name it in AMRTEX_PROGRAM"
 experiments=$root/experiments
-mkdir -p "$out" 2>/dev/null && [ -w "$out" ] || refuse "$out: no folder that can be written; choose another with --out"
+if ! mkdir -p "$out" 2>/dev/null || ! : 2>/dev/null >"$out/summary.txt"; then
+  refuse "$out: no folder that can be written; choose another with --out"
+fi
 out=$(cd "$out" && pwd)
 free_kib=$(df -Pk "$out" | awk 'NR == 2 {print $4}')
 [ "$free_kib" -ge $((2 * 1024 * 1024)) ] || refuse "$out: $((free_kib / 1024)) MiB are free, 2048 are needed"
@@ -41,7 +43,6 @@ free_kib=$(df -Pk "$out" | awk 'NR == 2 {print $4}')
 # whatever is kept, it is kept there
 export TMPDIR=$out/tmp XDG_CACHE_HOME=$out/cache MESA_SHADER_CACHE_DIR=$out/cache __GL_SHADER_DISK_CACHE_PATH=$out/cache
 mkdir -p "$TMPDIR" "$XDG_CACHE_HOME"
-rm -f "$out/summary.txt"
 failures=0 passed=0 cut=0 left=0
 
 say() { printf '%s\n' "$*" | tee -a "$out/summary.txt"; }
@@ -109,7 +110,7 @@ one_picture() {
   run_experiment "$@" || return 1
   hashes=$(grep -o '"image_hash":"[0-9a-f]*"' "$part_folder/records.jsonl" | sort | uniq -c)
   echo "$hashes"
-  [ "$(printf '%s\n' "$hashes" | grep -c image_hash)" = 1 ] || { echo "pictures differ to the bit: $(echo $hashes)"; return 1; }
+  [ "$(printf '%s\n' "$hashes" | grep -c image_hash)" = 1 ] || { echo "pictures differ to the bit: ${hashes//$'\n'/,}"; return 1; }
 }
 
 points() {
