@@ -140,9 +140,9 @@ EglDisplay display_of(const EglLibrary& egl, const EglDevice& device) {
   return {egl, EGL_PLATFORM_DEVICE_EXT, device.handle};
 }
 
-/// The first device of EGL's list that gives a context.
+/// The first device of EGL's list that gives a context. `told`: a reason that need not be told again.
 std::unique_ptr<Context> make_first_device_context(const EglLibrary& egl, ContextKind kind, bool hardware_only,
-                                                   const ContextOptions& options) {
+                                                   const ContextOptions& options, std::string_view told = "") {
   std::string reasons;
   for (const EglDevice& device : list_devices(egl)) {
     if (hardware_only && device.software) continue;
@@ -152,7 +152,7 @@ std::unique_ptr<Context> make_first_device_context(const EglLibrary& egl, Contex
       if (!hardware_only || !context->info().software) return context;
       reasons += fmt::format(" ({} is software)", context->info().renderer);
     } catch (const Error& e) {
-      reasons += fmt::format(" ({})", e.what());
+      if (e.what() != told) reasons += fmt::format(" ({})", e.what());
     }
   }
   throw Error(fmt::format("no {} found{}", hardware_only ? "hardware device" : "EGL device with GL 4.5 core", reasons));
@@ -167,13 +167,15 @@ std::unique_ptr<Context> make_egl_context(const ContextChoice& choice, const Con
   if (choice.device) return std::make_unique<EglContext>(choice.kind, display_of(egl, find_device(egl, *choice.device)), options);
   if (choice.kind == ContextKind::egl_device) return make_first_device_context(egl, choice.kind, true, options);
   std::string reason = "EGL_MESA_platform_surfaceless is missing";
+  std::string told;
   if (egl.has_client_extension("EGL_MESA_platform_surfaceless")) try {
       return std::make_unique<EglContext>(choice.kind, EglDisplay(egl, EGL_PLATFORM_SURFACELESS_MESA, nullptr), options);
     } catch (const Error& e) {
-      reason = fmt::format("surfaceless platform: {}", e.what());
+      told = e.what();
+      reason = fmt::format("surfaceless platform: {}", told);
     }
   try {
-    return make_first_device_context(egl, choice.kind, false, options);
+    return make_first_device_context(egl, choice.kind, false, options, told);
   } catch (const Error& e) {
     throw Error(fmt::format("{}; {}", reason, e.what()));
   }
