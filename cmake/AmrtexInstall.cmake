@@ -3,7 +3,14 @@
 include(GNUInstallDirs)
 set(AMRTEX_SHARE ${CMAKE_INSTALL_DATADIR}/amrtex)
 
+# where a bundle has their libraries (AmrtexBundle.cmake); elsewhere nothing lies there but the module
+set_target_properties(amrtex PROPERTIES INSTALL_RPATH "$ORIGIN/../lib/amrtex")
+set_target_properties(amrtex_hdf5 PROPERTIES INSTALL_RPATH "$ORIGIN")
+target_link_options(amrtex PRIVATE -Wl,--enable-new-dtags)
+target_link_options(amrtex_hdf5 PRIVATE -Wl,--enable-new-dtags)
 install(TARGETS amrtex RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(TARGETS amrtex_hdf5 LIBRARY DESTINATION lib/amrtex)
+install(PROGRAMS scripts/gpu_check.sh DESTINATION ${AMRTEX_SHARE}/scripts)
 install(FILES README.md CONTRIBUTING.md LICENSE CITATION.cff DESTINATION ${AMRTEX_SHARE})
 install(DIRECTORY docs data DESTINATION ${AMRTEX_SHARE})
 # records are large, and tables hold what people read of them

@@ -9,7 +9,7 @@ set -euo pipefail
 packages=(g++ cmake ninja-build pkg-config python3 python3-glad
           libegl-dev libgl-dev libglm-dev libtbb-dev nlohmann-json3-dev libfmt-dev libspdlog-dev
           libtinyobjloader-dev libcli11-dev libpng-dev libopenexr-dev libpugixml-dev zlib1g-dev libzip-dev libhdf5-dev libxxhash-dev libgtest-dev
-          libgmock-dev libbenchmark-dev librapidcheck-dev)
+          libgmock-dev libbenchmark-dev librapidcheck-dev patchelf)
 # a browser, LaTeX, a second reader of what we write, engines of clusters, a bare root of another distribution
 optional=(chromium texlive-latex-recommended texlive-latex-extra python3-h5py python3-yt paraview python3-paraview
           snakemake slurm-wlm mmdebstrap)
@@ -20,7 +20,7 @@ case ${1:-} in
 esac
 mesa=(libgl1-mesa-dri libegl-mesa0 libglx-mesa0 mesa-vulkan-drivers libvulkan1 libgbm1)
 # Mesa 25.1 dropped OSMesa; where a distribution has no package, the EGL path alone remains.
-osmesa=libosmesa6-dev
+osmesa=libosmesa6
 
 run_as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
 installed() { dpkg-query -W -f='${Status}' "$1" 2>/dev/null | grep -q '^install ok installed$'; }

@@ -306,7 +306,9 @@ void draw_surface(IN(Ray) ray, INOUT(Accumulation) a) {
   vec2r lit = vec2r(1);  // of the surface, and of the sample whose interval is split
 #if AMRTEX_CPP || AMRTEX_SHADOWS
   if (AMRTEX_SHADOWS != 0)
-    for (int i = 0; i < 2; ++i)  // a loop: the text of a secondary ray stands here once
+    // a loop: the text of a secondary ray stands here once. llvmpipe inlines every call and compiles for seconds otherwise; a compiler
+    // that unrolls it gives that back and is as fast.
+    for (int i = 0; i < 2; ++i)
       lit[i] = lamp_light(a, i == 0 ? p : make_position(ray.entry + ray.direction * (shift > real(0) ? a.after : a.before)));
 #endif
   if (AMRTEX_DRAWS_VOLUME) shift_volume(a, value, shift, lit.y);

@@ -194,7 +194,7 @@ int march_lattice_block(INOUT(Accumulation) a, IN(LatticeBlock) block, IN(int) f
       Region r;
       int first = i;
       bool skipped = true;
-      do {  // the next region that can be seen: all lanes of a SIMD group then sample together
+      do {  // the next region that can be seen: all lanes of a SIMD group then sample together, 8 on llvmpipe as 32 or 64 on a GPU
         first = i;
         Position p = lattice_position(block, real(i));
         bool leaped = AMRTEX_LEAPS != 0 && leap(p, up, r);

@@ -30,6 +30,9 @@ void note_ray_end(IN(Ray) ray, INOUT(Accumulation) a, IN(bool) exit) {
   note_side(a, !has_value, s.value, exit ? ray.length : ray.first, at);
 }
 
+// Loops here and below are `if (n > 0) do ... while`, and not `while`: llvmpipe runs a body masked once even where no lane enters it
+// (a fetch that none asked for). A GPU's compiler makes the same code of both.
+//
 // The loop over samples stops at each surface, so that none of what a surface costs (bisection, gradient) is inside of it.
 void march_surfaces(IN(Ray) ray, INOUT(Accumulation) a, INOUT(Front) front) {
   int part = 0;  // of the ray: its entry, its head, all intervals that follow, its exit

@@ -18,6 +18,9 @@ real curve_axis(IN(real) value, IN(bool) logarithmic) {
 }
 real transfer_axis(IN(real) value) { return curve_axis(value, AMRTEX_LOGARITHMIC != 0); }
 
+// The loops over points have constant bounds and no branch out of them: llvmpipe unrolls them into selects, as a GPU does; leaving early
+// would save a GPU little, since the lanes of a group hold different values.
+//
 // A function of that name: colour over an axis, from an array of `count` points of 5 numbers: axis value,
 // 1 / distance from the one before, rgb less that one's.
 #define AMRTEX_COLOR_CURVE(name, points, count)                                                       \

@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <fmt/format.h>
+
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <numeric>
 
@@ -106,10 +109,68 @@ TEST(ContextA0Probe, DescribesTheContext) {
   EXPECT_EQ(to_json(context_info_from_json(to_json(probe.info))), to_json(probe.info));
 }
 
+/// Why a context cannot be had where variables say what is opened; in a child, since a driver reads them once.
+std::string refusal(const ContextChoice& choice, const std::vector<std::pair<const char*, const char*>>& variables) {
+  const ChildResult child = run_in_child(
+      [&] {
+        for (const auto& [name, value] : variables) ::setenv(name, value, 1);
+        return make_context(choice)->info().version;
+      },
+      60s);
+  EXPECT_FALSE(child.ok) << choice.name() << ": " << child.text;
+  EXPECT_LE(child.reason.size(), 400u) << child.reason;
+  EXPECT_EQ(child.reason.find('\n'), std::string::npos) << child.reason;
+  return child.reason;
+}
+
+TEST(ContextA0Probe, WhereNoDriverIsTheLineSaysWhatIsThereAndWhatIsNeeded) {
+  const std::string no_egl = refusal(ContextKind::egl, {{"AMRTEX_EGL", "/nonexistent/libEGL.so.1"}});
+  for (const char* part : {"context egl: no EGL", "/nonexistent/libEGL.so.1", "needed", "AMRTEX_EGL"}) expect_contains(no_egl, part);
+  const std::string no_osmesa = refusal(ContextKind::osmesa, {{"AMRTEX_OSMESA", "/nonexistent/libOSMesa.so"}});
+  for (const char* part : {"no OSMesa", "/nonexistent/libOSMesa.so", "libosmesa6", "AMRTEX_OSMESA"}) expect_contains(no_osmesa, part);
+  expect_contains(refusal(ContextKind::egl, {{"AMRTEX_EGL", "libc.so.6"}}), "libc.so.6 has no eglGetError");
+  expect_contains(refusal(ContextKind::osmesa, {{"AMRTEX_OSMESA", "libc.so.6"}}), "libc.so.6 has no function OSMesa");
+}
+
+TEST(ContextA0Probe, AnEglWithoutOpenGlIsTold) {
+  const std::string reason = refusal(ContextKind::egl, {{"AMRTEX_EGL", AMRTEX_EGL_WITHOUT_OPENGL}});
+  for (const char* part : {"this EGL has no OpenGL, it has OpenGL_ES", "needed: OpenGL 4.5 core"}) expect_contains(reason, part);
+}
+
+TEST(ContextA0Probe, ADriverThatIsTooOldIsTold) {
+  const ContextProbe usual = probe_context(ContextKind::egl, 60s);
+  if (!usual.ok || usual.info.version.find("Mesa") == std::string::npos) GTEST_SKIP() << "only Mesa can be told to be old";
+  const std::string reason = refusal(ContextKind::egl, {{"MESA_GL_VERSION_OVERRIDE", "3.3"}});
+  for (const char* part : {"3.3", "needed", "4.5"}) expect_contains(reason, part);
+}
+
+TEST(ContextA0Probe, DevicesAreListedAndEachIsChosenByItsNumber) {
+  std::string reason;
+  const std::vector<ListedDevice> devices = probe_devices(60s, reason);
+  if (devices.empty()) GTEST_SKIP() << reason;
+  int last = 0;
+  for (const ListedDevice& device : devices) {
+    EXPECT_EQ(device.index, last++);
+    EXPECT_EQ(device.text.find(std::to_string(device.index)), 0u) << device.text;
+    const ContextProbe probe = probe_context({ContextKind::egl_device, device.index}, 60s);
+    if (probe.ok)
+      EXPECT_EQ(probe.info.device, device.index);
+    else
+      EXPECT_FALSE(probe.reason.empty());
+  }
+  const std::string absent = refusal({ContextKind::egl_device, last}, {});
+  expect_contains(absent, fmt::format("context egl_device:{0}: no device {0}; there", last));
+  for (const ListedDevice& device : devices) expect_contains(absent, device.text);
+}
+
 TEST(ContextKinds, AnUnknownNameNamesTheKnownOnes) {
-  EXPECT_EQ(parse_context_kind("osmesa"), ContextKind::osmesa);
-  EXPECT_THROW(parse_context_kind("glx"), UsageError);
-  expect_contains(error_of([] { parse_context_kind("glx"); }), "egl, egl_device, osmesa");
+  EXPECT_EQ(parse_context("osmesa").kind, ContextKind::osmesa);
+  EXPECT_EQ(parse_context("egl_device:2").device, 2);
+  EXPECT_EQ(parse_context("egl_device:2").name(), "egl_device:2");
+  for (const char* wrong : {"glx", "egl_device:", "egl_device:-1", "egl_device:1x", "egl_device:99999999999", "egl:0"}) {
+    EXPECT_THROW(parse_context(wrong), UsageError) << wrong;
+    expect_contains(error_of([&] { parse_context(wrong); }), "egl, egl_device, osmesa");
+  }
 }
 
 class ContextTest : public testing::TestWithParam<ContextKind> {
@@ -173,6 +234,16 @@ TEST_P(ContextTest, AGlErrorIsFatalAtTheNextCheck) {
   expect_contains(message, "testing");
   expect_contains(message, "GL_INVALID_ENUM");
   EXPECT_NO_THROW(context_->check("afterwards"));
+}
+
+TEST_P(ContextTest, WhereGlHasNoMemoryLeftItIsTheBudgetAndTheContextGoesOn) {
+  const GlBuffer buffer = make_buffer(*context_);
+  const GLsizeiptr petabyte = GLsizeiptr{1} << 50;
+  context_->gl().NamedBufferStorage(buffer.id(), petabyte, nullptr, 0);
+  EXPECT_THROW(context_->check("allocating"), BudgetError);
+  const GlBuffer small = make_buffer(*context_);
+  context_->gl().NamedBufferStorage(small.id(), 64, nullptr, 0);
+  EXPECT_NO_THROW(context_->check("allocating less"));
 }
 
 TEST_P(ContextTest, WithoutDebugOutputErrorsAreFatalToo) {

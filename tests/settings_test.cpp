@@ -122,6 +122,7 @@ const std::vector<Change>& changes() {
   static const std::vector<Change> all = {
       {"consumer", R"("multipass")"},
       {"slice_target", R"("rgba8")", Mode::dvr, R"({"consumer": "slices"})"},
+      {"dispatch", R"("compute")"},
       {"mode", R"("mip")"},
       {"sampling", R"("lattice")"},
       {"step", "0.5"},

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "bench/cli/commands.hpp"
+#include "bench/cli/context_arguments.hpp"
 #include "bench/measure/advise.hpp"
 #include "bench/records/record.hpp"
 #include "bench/settings/default_scene.hpp"
@@ -24,7 +25,8 @@ constexpr double kMebibyte = 1048576.0;
 constexpr std::size_t kRunnersUp = 8;  ///< told in print; --json has all
 
 struct Arguments {
-  std::string data, field, memory_limit, transfer_function, view, keep, scene, context = "egl", reference = "linear_vertex";
+  std::string data, field, memory_limit, transfer_function, view, keep, scene, reference = "linear_vertex";
+  ContextArguments context;
   std::vector<std::string> filters, storages, filterings;
   double tolerance = 1e-2;
   int width = 512, height = 512, frames = 5;
@@ -213,7 +215,7 @@ void check_scene_name(const std::string& scene) {
 int run(const Arguments& a) {
   const AdviceRequest request = request_of(a);
   RunOptions options;
-  options.context = parse_context_kind(a.context);
+  options.context = a.context.choice("egl");
   if (!a.scene.empty()) check_scene_name(a.scene);
   const AmrHierarchy mesh = read_data(a);
   const Json scene = scene_json(a, mesh);
@@ -273,7 +275,7 @@ void add_advise_command(CLI::App& app, Command& chosen) {
   c->add_option("--width", a->width, "pixels; 512 otherwise")->check(CLI::Range(1, 16384));
   c->add_option("--height", a->height, "pixels; 512 otherwise")->check(CLI::Range(1, 16384));
   c->add_option("--frames", a->frames, "timed frames of each of the last pictures; 5 otherwise")->check(CLI::Range(1, 1000));
-  c->add_option("--context", a->context, "egl, egl_device or osmesa; egl otherwise");
+  add_context_options(*c, a->context, "egl otherwise");
   c->add_option("--keep", a->keep, "folder for the records of all measurements; asked again it goes on from them");
   c->add_option("--scene", a->scene, "scene file to write, for `amrtex render`");
   c->add_flag("--json", a->json, "for programs");

@@ -2,7 +2,7 @@
 #include <fmt/ranges.h>
 #include <stdlib.h>  // setenv
 
-#include <array>
+#include <vector>
 
 #include "bench/cli/commands.hpp"
 #include "renderers/context/context_probe.hpp"
@@ -12,19 +12,22 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A way to get a context: a kind, and for zink the environment that chooses the driver.
+/// A way to get a context, and for zink the environment that chooses the driver.
 struct Way {
   const char* name;
-  ContextKind kind;
+  ContextChoice choice;
   bool zink;
 };
-constexpr std::array<Way, 4> kWays{{{"egl", ContextKind::egl, false},
-                                    {"egl_device", ContextKind::egl_device, false},
-                                    {"osmesa", ContextKind::osmesa, false},
-                                    {"egl, software driver zink", ContextKind::egl, true}}};
+
+std::vector<Way> ways() {
+  return {{"egl", ContextKind::egl, false},
+          {"egl_device", ContextKind::egl_device, false},
+          {"osmesa", ContextKind::osmesa, false},
+          {"egl, software driver zink", ContextKind::egl, true}};
+}
 
 ContextProbe probe(const Way& way) {
-  if (!way.zink) return probe_context(way.kind, 20s);
+  if (!way.zink) return probe_context(way.choice, 20s);
   const ChildResult child = run_in_child(
       [] {
         setenv("LIBGL_ALWAYS_SOFTWARE", "1", 1);
@@ -67,8 +70,8 @@ void print_unsupported_values(const Json& entry, std::string_view before) {
 }
 
 int print_encodings(bool json) {
-  const ContextProbe egl = probe(kWays[0]);
-  const ContextProbe osmesa = egl.ok ? egl : probe(kWays[2]);
+  const ContextProbe egl = probe_context(ContextKind::egl, 20s);
+  const ContextProbe osmesa = egl.ok ? egl : probe_context(ContextKind::osmesa, 20s);
   const Json list = encodings_json(osmesa.ok ? &osmesa.info : nullptr);
   if (json) {
     fmt::print("{}\n", list.dump(2));
@@ -86,15 +89,22 @@ int print_encodings(bool json) {
   return 0;
 }
 
-void print_context(const Way& way, const ContextProbe& p) {
-  fmt::print("context {}\n", way.name);
+/// "no memory query", or what is free.
+std::string memory_text(const GlContextInfo& i) {
+  if (i.total_memory_bytes > 0) return fmt::format("{} bytes, {} free", i.total_memory_bytes, i.free_memory_bytes);
+  return i.free_memory_bytes > 0 ? fmt::format("{} bytes free", i.free_memory_bytes) : "the driver does not tell";
+}
+
+void print_context(const std::string& name, const ContextProbe& p) {
+  fmt::print("{}\n", name);
   if (!p.ok) {
     fmt::print("  not available: {}\n", p.reason);
     return;
   }
   const GlContextInfo& i = p.info;
-  fmt::print("  renderer            {} ({})\n  GL                  {}, GLSL {}\n", i.renderer,
-             i.software ? "software" : "hardware", i.version, i.glsl_version);
+  fmt::print("  renderer            {} ({})\n  vendor              {}\n  GL                  {}, GLSL {}\n", i.renderer,
+             i.software ? "software" : "hardware", i.vendor, i.version, i.glsl_version);
+  fmt::print("  GPU memory          {}\n", memory_text(i));
   fmt::print("  3D texture          {} texels an axis, {}\n  storage block       {} bytes, {} bindings\n", i.max_3d_texture_size,
              i.has_texture_limit() ? fmt::format("{} bytes", i.max_texture_bytes) : "no limit of bytes known", i.max_buffer_bytes,
              i.max_storage_bindings);
@@ -113,22 +123,44 @@ void print_context(const Way& way, const ContextProbe& p) {
   }
 }
 
+Json probe_json(const ContextProbe& p) {
+  Json entry;
+  entry["available"] = p.ok;
+  entry["reason"] = p.ok ? Json(nullptr) : Json(p.reason);
+  if (p.ok) {
+    entry["info"] = to_json(p.info);
+    entry["encodings"] = encodings_json(&p.info);
+  }
+  return entry;
+}
+
+/// Every device of EGL's list, usable or not.
+Json probe_all_devices(bool print) {
+  Json list = Json::array();
+  std::string reason;
+  for (const ListedDevice& device : probe_devices(20s, reason)) {
+    const ContextProbe p = probe_context({ContextKind::egl_device, device.index}, 20s);
+    Json entry = probe_json(p);
+    entry["device"] = device.index;
+    entry["name"] = device.text;
+    list.push_back(entry);
+    if (print) print_context(fmt::format("device {}, with --context egl_device --device {}", device.text, device.index), p);
+  }
+  if (print && list.empty()) fmt::print("devices\n  none: {}\n", reason);
+  return list;
+}
+
 int doctor(bool json) {
   Json all = Json::object();
   bool any = false;
-  for (const Way& way : kWays) {
+  for (const Way& way : ways()) {
     const ContextProbe p = probe(way);
     any = any || p.ok;
-    Json entry;
-    entry["available"] = p.ok;
-    entry["reason"] = p.ok ? Json(nullptr) : Json(p.reason);
-    if (p.ok) {
-      entry["info"] = to_json(p.info);
-      entry["encodings"] = encodings_json(&p.info);
-    }
-    all[way.zink ? "egl_zink" : way.name] = entry;
-    if (!json) print_context(way, p);
+    all[way.zink ? "egl_zink" : way.name] = probe_json(p);
+    if (!json) print_context(fmt::format("context {}", way.name), p);
   }
+  all["devices"] = probe_all_devices(!json);
+  for (const Json& device : all["devices"]) any = any || device.at("available").get<bool>();
   if (json) fmt::print("{}\n", all.dump(2));
   return any ? 0 : 1;
 }

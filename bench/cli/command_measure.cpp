@@ -52,7 +52,7 @@ RunOptions RunArguments::options() const {
   options.folder = output;
   options.pictures = !no_pictures;
   options.shader_cache = options.folder / "shader_cache";
-  if (!context.empty()) options.context = parse_context_kind(context);
+  if (context.given()) options.context = context.choice("egl");
   if (!memory_limit.empty()) options.memory_limit = parse_bytes(memory_limit);
   return options;
 }
@@ -71,7 +71,7 @@ std::vector<std::string> RunArguments::measuring_process() const {
   const auto add = [&](const char* option, const std::string& value) {
     if (!value.empty()) words.insert(words.end(), {option, value});
   };
-  add("--context", context);
+  if (context.given()) add("--context", context.choice("egl").name());
   add("--memory-limit", memory_limit);
   for (const std::string& s : set) add("--set", s);
   if (no_pictures) words.emplace_back("--no-pictures");
@@ -85,7 +85,7 @@ void add_run_arguments(CLI::App& command, RunArguments& a) {
           ->expected(2);
   input->excludes(record);
   command.add_option("--out", a.output, "folder for records, pictures and tables")->required();
-  command.add_option("--context", a.context, "egl, egl_device or osmesa; overrides the experiment's");
+  add_context_options(command, a.context, "overrides the experiment's");
   command.add_option("--memory-limit", a.memory_limit, "for one structure, as 512MiB");
   add_set_option(command, a.set);
   command.add_option("--max-points", a.max_points, "points of one file, above which it is refused")->capture_default_str();
@@ -101,7 +101,7 @@ void add_measure_command(CLI::App& app, Command& chosen) {
     chosen = [a] {
       Experiment experiment = a->experiment();
       const RunOptions options = a->options();
-      if (options.context) experiment.context = context_kind_name(*options.context);
+      if (options.context) experiment.context = options.context->name();
       if (options.memory_limit) experiment.memory_limit = options.memory_limit;
       return answer_questions(experiment, options, 0, kAnswers);
     };

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "bench/cli/commands.hpp"
+#include "bench/cli/context_arguments.hpp"
 #include "bench/cli/render_arguments.hpp"
 #include "bench/measure/error_split.hpp"
 #include "bench/measure/scene_data.hpp"
@@ -28,7 +29,8 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Arguments : SceneArguments {
-  std::string input, output, context, memory_limit, save_scene;
+  std::string input, output, memory_limit, save_scene;
+  ContextArguments context;
   std::vector<std::string> set;
   bool reference = false;
   bool color_bar = false;
@@ -314,7 +316,7 @@ int run(Arguments a) {
   if (!a.output.empty() || a.explain_error) {
     Scene drawn = with_tolerance(scene_of(d.scene, d.scene.renders.front()), a.tolerance);
     drawn.settings.prune = drawn.settings.prune || a.prune;
-    const auto context = make_context(parse_context_kind(a.context.empty() ? d.scene.context : a.context));
+    const auto context = make_context(a.context.choice(d.scene.context));
     for (const std::string& warning : scene_warnings(d.mesh, drawn)) fmt::print(stderr, "warning: {}\n", printable(warning));
     if (data && free_encoding(a, d))
       draw_by_first(a, d, drawn, *context);
@@ -342,7 +344,7 @@ void add_render_command(CLI::App& app, Command& chosen) {
   c->add_flag("--no-color-bar", a->no_color_bar, "the picture alone")->excludes(bar);
   CLI::Option* outline = c->add_flag("--outline", a->outline, "the domain's edges behind the picture; of data sets anyway");
   c->add_flag("--no-outline", a->no_outline, "without them")->excludes(outline);
-  c->add_option("--context", a->context, "egl, egl_device or osmesa; overrides the scene's");
+  add_context_options(*c, a->context, "overrides the scene's");
   c->add_option("--memory-limit", a->memory_limit, "for the structure, as 512MiB");
   add_set_option(*c, a->set);
   c->add_flag("--reference", a->reference, "draw the double-precision reference of the filter instead");

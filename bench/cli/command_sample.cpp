@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "bench/cli/commands.hpp"
+#include "bench/cli/context_arguments.hpp"
 #include "bench/measure/error_split.hpp"
 #include "renderers/consumers/probe.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
@@ -17,7 +18,8 @@ namespace {
 
 struct Arguments {
   std::string data, field, encoding, filter, points;
-  std::string storage = "r32f", filtering = "manual", context = "egl";
+  std::string storage = "r32f", filtering = "manual";
+  ContextArguments context;
   std::vector<std::string> parameters;
   bool json = false;
 };
@@ -85,10 +87,10 @@ std::vector<Sampled> sample(const Arguments& a) {
   request.needs = {parse_filter(a.filter), parse_filtering(a.filtering), true};
   request.storage = parse_storage(a.storage);
   request.parameters = complete_parameters(encoding, parse_parameters(a.parameters));
-  const ContextKind kind = parse_context_kind(a.context);
+  const ContextChoice choice = a.context.choice("egl");
   const std::vector<Vec3d> points = read_points(a.points);
   const AmrHierarchy mesh(read_mesh(a.data, FieldChoice::one(a.field)));
-  const auto context = make_context(kind);
+  const auto context = make_context(choice);
   request.context = context->info();
   require_support(encoding, request.context);
   const Structure structure(*context, encoding.build(mesh, request), request);
@@ -159,7 +161,7 @@ void add_sample_command(CLI::App& app, Command& chosen) {
   c->add_option("--parameter", a->parameters, "build parameter NAME=VALUE; may be repeated");
   c->add_option("--storage", a->storage, "r8, r16, r16f, r32f");
   c->add_option("--filtering", a->filtering, "hardware or manual");
-  c->add_option("--context", a->context, "egl, egl_device or osmesa");
+  add_context_options(*c, a->context, "egl otherwise");
   c->add_flag("--json", a->json, "for programs");
   c->footer(
       "Reference and encoding double are taken at the point itself. A GL context is given a cell and a fraction of it in float: "

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "bench/cli/commands.hpp"
+#include "bench/cli/context_arguments.hpp"
 #include "bench/measure/environment.hpp"
 #include "bench/verify/verify.hpp"
 #include "structures/mesh/whole_file.hpp"
@@ -14,7 +15,7 @@ namespace {
 
 struct Arguments {
   std::vector<std::string> suites;
-  std::string context = "egl";
+  ContextArguments context;
   std::string output;
   std::size_t one_in = 1;
   bool full = false;
@@ -43,7 +44,7 @@ int run(const Arguments& a) {
     for (const verify::Suite& s : verify::suites()) chosen.push_back(&s);
   if (!a.output.empty()) make_folder(a.output);  // before minutes of work, not after them
   verify::VerifyOptions options;
-  options.context = parse_context_kind(a.context);
+  options.context = a.context.choice("egl");
   options.full = a.full;
   options.one_in = a.one_in;
   const bool terminal = isatty(STDERR_FILENO) != 0;
@@ -80,7 +81,7 @@ void add_verify_command(CLI::App& app, Command& chosen) {
   c->add_flag("--full", a->full, "more meshes, seeds and steps; takes many minutes");
   c->add_option("--one-in", a->one_in, "ask each case of one in so many encodings and filters, in turn (default: of all)")
       ->check(CLI::PositiveNumber);
-  c->add_option("--context", a->context, "egl, egl_device or osmesa");
+  add_context_options(*c, a->context, "egl otherwise");
   c->add_flag("--json", a->json, "for programs");
   c->add_option("--out", a->output, "folder for verify.json, table.md and cases.csv as well");
   c->footer("Example: amrtex verify --suite analytic --context osmesa");

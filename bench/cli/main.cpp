@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "bench/cli/commands.hpp"
+#include "bench/cli/newer_runtime.hpp"
 #include "structures/mesh/error.hpp"
 #include "structures/mesh/quoted.hpp"
 
@@ -56,6 +57,7 @@ void amrtex::print_warnings(const std::vector<std::string>& warnings) {
 }
 
 int main(int argc, char** argv) {
+  amrtex::prefer_newer_cpp_library(argv);
   CLI::App app{"amrtex: GPU encodings of AMR data, compared by memory, frame time and image error"};
   app.name("amrtex");
   app.require_subcommand(1);

@@ -6,13 +6,15 @@
 #include <string>
 #include <vector>
 
+#include "bench/cli/context_arguments.hpp"
 #include "bench/measure/run_options.hpp"
 
 namespace amrtex {
 
 /// All that says which experiment it is and where it goes.
 struct RunArguments {
-  std::string input, output, context, memory_limit;
+  std::string input, output, memory_limit;
+  ContextArguments context;
   std::vector<std::string> record;  ///< a file of records, and a configuration: the experiment is that of this point
   std::vector<std::string> set;
   std::uint64_t max_points = ReadOptions{}.most_points;

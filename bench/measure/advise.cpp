@@ -527,7 +527,7 @@ Measure measure_by_running(const Experiment& scene, const AdviceRequest& request
     Experiment experiment = scene;
     experiment.reference = reference_of(request);
     experiment.unchecked_because = "advise reads the error itself";
-    if (options.context) experiment.context = context_kind_name(*options.context);
+    if (options.context) experiment.context = options.context->name();
     if (request.memory_limit != std::numeric_limits<std::int64_t>::max()) experiment.memory_limit = request.memory_limit;
     experiment.builds.clear();
     experiment.renders.clear();

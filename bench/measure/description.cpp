@@ -30,6 +30,9 @@ Json described_context(const GlContextInfo& info, const Json& shader_cache) {
   Json context = context_json();
   context["renderer"] = info.renderer;
   context["device"] = info.software ? context["cpu"] : Json(info.renderer);
+  context["device_index"] = info.device >= 0 ? Json(info.device) : Json();
+  context["gpu_memory_bytes"] = info.total_memory_bytes > 0 ? Json(info.total_memory_bytes) : Json();
+  context["gpu_memory_free_bytes"] = info.free_memory_bytes > 0 ? Json(info.free_memory_bytes) : Json();
   context["shader_cache"] = shader_cache;
   context["gl_version"] = info.version;
   context["software"] = info.software;

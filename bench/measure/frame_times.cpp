@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "bench/measure/gpu_timing.hpp"
 #include "bench/measure/timing.hpp"
 #include "bench/numbers/baseline_drift.hpp"
 #include "bench/numbers/statistics.hpp"
@@ -33,18 +34,27 @@ double baseline_ms(Consumer* baseline) {
   return median(wall);
 }
 
-Json frame_json(const RenderPoint& render, const std::vector<FrameTime>& frames, bool software) {
+/// Draws before anything is timed. A GPU raises its clock while it works: there they go on until times are steady.
+WarmUp warm_up(const RenderPoint& render, Consumer& consumer, bool on_gpu) {
+  if (on_gpu) return warm_up_until_steady(render.warm_up, [&] { return consumer.draw().wall_ms; });
+  for (int i = 0; i < render.warm_up; ++i) consumer.draw();
+  return {render.warm_up, false};
+}
+
+Json gpu_part(const RenderPoint& render, Consumer& consumer, Context& context, const std::string& refusal) {
+  const std::optional<TimerQuality> timer = refusal.empty() ? measure_timer(context) : std::nullopt;
+  if (!timer || render.frames <= 0) return refused_gpu_frame_json(refusal.empty() ? "no frames are timed" : refusal);
+  return gpu_frame_json(time_on_gpu(consumer, render.frames, *timer, GpuStateReader(context.info())));
+}
+
+Json frame_json(const std::vector<FrameTime>& frames, const WarmUp& warmed, bool on_gpu) {
   std::vector<double> wall;
-  std::vector<double> gpu;
-  for (const FrameTime& f : frames) {
-    wall.push_back(f.wall_ms);
-    gpu.push_back(f.gpu_ms);
-  }
+  for (const FrameTime& f : frames) wall.push_back(f.wall_ms);
   Json frame;
   frame["wall_ms"] = timing_json(wall);
-  frame["gpu_ms"] = software ? Json() : timing_json(gpu);  // there the timer tells of the last tile alone
   frame["all_wall_ms"] = wall;
-  frame["warm_up"] = render.warm_up;
+  frame["warm_up"] = warmed.draws;
+  frame["steady"] = on_gpu ? Json(warmed.steady) : Json();
   frame["baseline_ms"] = nullptr;
   frame["relative"] = nullptr;
   return frame;
@@ -81,16 +91,20 @@ Consumer* Baseline::beside(const RenderPoint& render) {
   return consumer_.get();
 }
 
-FrameTimes time_point(const RenderPoint& render, Consumer& consumer, Consumer* baseline, bool software) {
+FrameTimes time_point(const RenderPoint& render, Consumer& consumer, Consumer* baseline, Context& context) {
+  const std::string refusal = timer_refusal(context.info());
+  WarmUp warmed;
   std::vector<FrameTime> frames;
   BaselineTimes beside;
   for (int tries = 0; tries < kTimingTries; ++tries) {
     beside.before = baseline_ms(baseline);
-    frames = time_frames(consumer, render.warm_up, render.frames);
+    warmed = warm_up(render, consumer, refusal.empty());
+    frames = time_frames(consumer, 0, render.frames);
     beside.after = baseline_ms(baseline);
     if (baseline == nullptr || beside.agree()) break;
   }
-  FrameTimes times{frame_json(render, frames, software), ""};
+  FrameTimes times{frame_json(frames, warmed, refusal.empty()), ""};
+  times.frame.update(gpu_part(render, consumer, context, refusal));
   if (baseline == nullptr) return times;
   times.frame["baseline_ms"] = {beside.before, beside.after};
   times.frame["relative"] = times.frame.at("wall_ms").at("median").get<double>() / beside.mean();

@@ -42,6 +42,6 @@ struct FrameTimes {
 };
 
 /// Times the point again where the baseline, before and after it, does not agree with itself. `baseline` is null for none.
-FrameTimes time_point(const RenderPoint& render, Consumer& consumer, Consumer* baseline, bool software);
+FrameTimes time_point(const RenderPoint& render, Consumer& consumer, Consumer* baseline, Context& context);
 
 }  // namespace amrtex

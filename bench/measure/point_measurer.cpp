@@ -76,7 +76,7 @@ PointMeasurer::PointMeasurer(const Experiment& experiment, std::size_t dataset, 
 
 Context& PointMeasurer::context() {
   if (!context_) {
-    context_ = make_context(parse_context_kind(options_.context));
+    context_ = make_context(parse_context(options_.context));
     baseline_ = std::make_unique<Baseline>(experiment_, data_.dataset(), data_.mesh(), *context_);
   }
   return *context_;
@@ -220,7 +220,7 @@ void PointMeasurer::add_times(Json& record, const RenderPoint& render, Consumer&
   options_.phase(Phase::other);
   Consumer* const beside = baseline_->beside(render);
   options_.phase(Phase::drawing);
-  const FrameTimes times = time_point(render, consumer, beside, context().info().software);
+  const FrameTimes times = time_point(render, consumer, beside, context());
   double frames = 0;
   for (const Json& ms : times.frame.at("all_wall_ms")) frames += ms.get<double>() / 1000;
   shares_.add(Share::frames, frames);

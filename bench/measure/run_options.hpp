@@ -25,7 +25,7 @@ struct RunOptions {
   int repeat = 1;                ///< processes that measure each point
   /// Compiled shaders are kept there for measurements alone (shader_cache.hpp); empty: wherever the driver keeps them.
   std::filesystem::path shader_cache{};
-  std::optional<ContextKind> context;        ///< overrides the experiment's
+  std::optional<ContextChoice> context;      ///< overrides the experiment's
   std::optional<std::int64_t> memory_limit;  ///< bytes of one build; overrides the experiment's
   /// Points that are measured; absent: all. Others are passed over as if they were not in the experiment.
   std::function<bool(const BuildPoint&, const RenderPoint&)> wanted;

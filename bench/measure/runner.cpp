@@ -198,7 +198,7 @@ class Sweep {
 /// The experiment as it is measured: records are named by what was really used.
 Experiment settled(const Experiment& experiment, const RunOptions& options) {
   Experiment result = experiment;
-  if (options.context) result.context = context_kind_name(*options.context);
+  if (options.context) result.context = options.context->name();
   if (options.memory_limit) result.memory_limit = options.memory_limit;
   return result;
 }

@@ -110,7 +110,7 @@ struct Bench {
   explicit Bench(const std::string& path) {
     const Experiment experiment = read_experiment(path);
     mesh.emplace(load_dataset(experiment, experiment.datasets.front()));
-    context = make_context(parse_context_kind(experiment.context));
+    context = make_context(parse_context(experiment.context));
     RenderPoint render = experiment.renders.front();
     render.settings.sampling = Sampling::lattice;
     render.settings.skip = false;

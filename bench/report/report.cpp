@@ -214,6 +214,7 @@ constexpr FixedColumn kMeasures[] = {
     {"upload", "upload (s)", "", Role::measure, true, value<"/upload_seconds">},
     {"wall", "frame wall (ms)", "", Role::measure, true, timing<"/frame/wall_ms">},
     {"gpu", "frame GPU (ms)", "", Role::measure, true, timing<"/frame/gpu_ms">},
+    {"gpu_draws", "draws in a GPU query (above 1: throughput)", "", Role::measure, true, value<"/frame/draws_per_query">},
     {"relative", "time / uniform", "", Role::measure, true, relative_cell},
     {"change", "change of transfer function (ms)", "", Role::measure, true, timing<"/change/wall_ms">},
     {"baseline", "time / baseline", "", Role::measure, true, value<"/frame/relative">},

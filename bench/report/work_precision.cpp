@@ -101,7 +101,7 @@ std::vector<CostPoint> p95_points(const Records& records, const Question& questi
 /// The `render` part of a record without the settings that work is traded for error by.
 Json scene_part(Json render) {
   for (const char* key :
-       {"consumer", "sampling", "step", "integrator", "tolerance", "skip", "prune", "needs", "early_end", "slice_target",
+       {"consumer", "sampling", "step", "integrator", "tolerance", "skip", "prune", "needs", "early_end", "slice_target", "dispatch",
         "iso_tolerance", "shadow_step", "level_of_detail", "max_level", "view_name", "transfer_function_name"})
     render.erase(key);
   return render;

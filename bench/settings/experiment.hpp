@@ -69,7 +69,7 @@ struct Experiment {
   std::vector<RenderPoint> renders;                                  ///< in the order of the file; no two alike
   std::optional<ReferenceSettings> reference = ReferenceSettings{};  ///< absent: errors are left out
   std::uint64_t seed = 1;                                            ///< of the order in which points are measured
-  std::string context = "egl";                                       ///< egl, egl_device or osmesa
+  std::string context = "egl";                                       ///< egl, egl_device or osmesa; from the command line egl_device:N as well
   std::optional<std::int64_t> memory_limit;                          ///< bytes of the textures and buffers of one build
   std::optional<double> minimum_psnr_db;         ///< against a point's own reference; absent: the default (check_bound.hpp)
   std::string check_why;                         ///< where minimum_psnr_db comes from, if the file says so

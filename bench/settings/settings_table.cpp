@@ -113,8 +113,8 @@ SettingTable<Experiment> make_experiment_settings() {
   rows.push_back({{.name = "context",
                    .type = choice_type({"egl", "egl_device", "osmesa"}),
                    .reference = AffectsReference::no,
-                   .help = "how GL is reached. `--context` overrides it"},
-                  [](const Experiment& e) -> Json { return e.context; },
+                   .help = "how GL is reached. `--context` overrides it, and `--device` says which one of EGL's devices"},
+                  [](const Experiment& e) -> Json { return e.context.substr(0, e.context.find(':')); },
                   [](Experiment& e, const Json& v) { e.context = v.get<std::string>(); }});
   rows.push_back({{.name = "seed",
                    .type = integer_type(0, kMostInteger),

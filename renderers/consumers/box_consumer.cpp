@@ -269,16 +269,36 @@ FrameTime BoxConsumer::draw() {
   const Frame frame = make_frame();
   upload(frame);
   timer_.begin();
-  target_.bind();
-  target_.clear(scene_.settings.mode == Mode::mip ? glm::vec4(kNoMaximum) : glm::vec4(0));
-  set_blending(false);
-  draw_passes(frame, target_);
+  draw_frame(frame);
   timer_.end();
   context_->gl().Finish();
   const std::chrono::duration<double, std::milli> wall = std::chrono::steady_clock::now() - start;
   reset_state();
   context_->check("drawing a frame");
   return {wall.count(), timer_.milliseconds()};
+}
+
+/// All that the GPU does for a picture.
+void BoxConsumer::draw_frame(const Frame& frame) const {
+  target_.bind();
+  target_.clear(scene_.settings.mode == Mode::mip ? glm::vec4(kNoMaximum) : glm::vec4(0));
+  set_blending(false);
+  draw_passes(frame, target_);
+}
+
+double BoxConsumer::gpu_ms_a_draw(int draws) {
+  context_->make_current();
+  bind(program_);
+  const Frame frame = make_frame();
+  upload(frame);
+  context_->gl().Finish();
+  timer_.begin();
+  for (int i = 0; i < draws; ++i) draw_frame(frame);
+  timer_.end();
+  const double all = timer_.milliseconds();
+  reset_state();
+  context_->check("timing frames");
+  return all / draws;
 }
 
 Picture BoxConsumer::read() const {

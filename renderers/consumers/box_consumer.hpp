@@ -27,6 +27,7 @@ class BoxConsumer final : public Consumer {
 
   /// The host's part is done anew each frame, as if the view had moved: order, polygons, upload.
   FrameTime draw() override;
+  double gpu_ms_a_draw(int draws) override;
   Picture read() const override;
   WorkCounts count() override;
   const std::string& shader_hash() const override { return program_.hash(); }
@@ -65,6 +66,7 @@ class BoxConsumer final : public Consumer {
   void add_polygon(Frame& frame, const ScreenPolygon& polygon, const DrawBox& box, int slice) const;
   void end_pass(Frame& frame, std::size_t first, int slice) const;
   void upload(const Frame& frame) const;
+  void draw_frame(const Frame& frame) const;
   void draw_passes(const Frame& frame, const DrawTarget& target) const;
   void set_blending(bool counting) const;
   void reset_state() const;

@@ -19,7 +19,7 @@ struct WorkCounts {
 
 struct FrameTime {
   double wall_ms = 0;  ///< from before the host's own work for the frame until glFinish
-  double gpu_ms = 0;   ///< GL_TIME_ELAPSED
+  double gpu_ms = 0;   ///< GL_TIME_ELAPSED; NaN without a timer
 };
 
 class Consumer {
@@ -38,6 +38,9 @@ class Consumer {
   virtual double triangle_seconds() const { return 0; }
   /// Of the map by which rays leap over what is hidden; 0 where there is none.
   virtual std::int64_t leap_bytes() const { return 0; }
+  /// Draws so many times inside one GL_TIME_ELAPSED query, with nothing read back; milliseconds a draw. With several draws it is
+  /// a throughput: the end of one may overlap the next. NaN without a timer.
+  virtual double gpu_ms_a_draw(int draws) = 0;
 };
 
 }  // namespace amrtex

@@ -15,6 +15,7 @@ class Raycaster final : public Consumer {
   Raycaster(Context& context, const DomainGeometry& geometry, const Structure& structure, const Scene& scene);
 
   FrameTime draw() override;
+  double gpu_ms_a_draw(int draws) override;
   /// The last picture drawn: 4 channels for dvr, else 1.
   Picture read() const override;
   WorkCounts count() override;
@@ -26,6 +27,7 @@ class Raycaster final : public Consumer {
 
  private:
   Program make_program(bool counting) const;
+  void start_rays(const DrawTarget& target, const Program& program) const;
 
   Context* context_;
   const GpuField* gpu_;

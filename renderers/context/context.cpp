@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <charconv>
 #include <cstdlib>
 #include <limits>
 #include <utility>
@@ -18,6 +19,7 @@ namespace {
 
 constexpr std::array<ContextKind, 3> kKinds{ContextKind::egl, ContextKind::egl_device, ContextKind::osmesa};
 constexpr std::string_view kKindNames = "egl, egl_device, osmesa";
+constexpr std::string_view kDevicePrefix = "egl_device:";
 // a driver may repeat one message for every draw call
 constexpr std::size_t kMaxKeptMessages = 64;
 
@@ -83,13 +85,20 @@ std::vector<std::string> get_extensions(const GladGLContext& gl) {
   return names;
 }
 
+constexpr std::int64_t kKib = 1024;  // both extensions count in it
+
 std::int64_t get_free_memory(const GladGLContext& gl, const GlContextInfo& info) {
-  constexpr std::int64_t kib = 1024;
-  if (info.has_extension("GL_NVX_gpu_memory_info")) return kib * get_int(gl, GL_GPU_MEMORY_INFO_CURRENT_AVAILABLE_VIDMEM_NVX);
+  if (info.has_extension("GL_NVX_gpu_memory_info")) return kKib * get_int(gl, GL_GPU_MEMORY_INFO_CURRENT_AVAILABLE_VIDMEM_NVX);
   if (!info.has_extension("GL_ATI_meminfo")) return 0;
   std::array<GLint, 4> values{};
   gl.GetIntegerv(GL_TEXTURE_FREE_MEMORY_ATI, values.data());
-  return kib * values[0];
+  return kKib * values[0];
+}
+
+/// GL_ATI_meminfo tells only what is free.
+std::int64_t get_total_memory(const GladGLContext& gl, const GlContextInfo& info) {
+  if (!info.has_extension("GL_NVX_gpu_memory_info")) return 0;
+  return kKib * get_int(gl, GL_GPU_MEMORY_INFO_DEDICATED_VIDMEM_NVX);
 }
 
 bool is_software(std::string_view renderer) {
@@ -144,9 +153,7 @@ void read_limits(const GladGLContext& gl, GlContextInfo& info) {
   gl.GetQueryiv(GL_TIME_ELAPSED, GL_QUERY_COUNTER_BITS, &info.timer_bits);
 }
 
-GlContextInfo read_info(const GladGLContext& gl, ContextKind kind) {
-  GlContextInfo info;
-  info.kind = context_kind_name(kind);
+GlContextInfo read_info(const GladGLContext& gl, GlContextInfo info) {
   info.renderer = get_text(gl, GL_RENDERER);
   info.version = get_text(gl, GL_VERSION);
   info.vendor = get_text(gl, GL_VENDOR);
@@ -157,10 +164,11 @@ GlContextInfo read_info(const GladGLContext& gl, ContextKind kind) {
   info.bindless_texture = info.has_extension("GL_ARB_bindless_texture");
   info.sparse_texture = info.has_extension("GL_ARB_sparse_texture");
   info.shader_ballot = info.has_extension("GL_ARB_shader_ballot");
-  // the extension asks for one handle in all invocations that run together; NVIDIA's hardware does not
-  info.handles_may_differ = info.vendor.starts_with("NVIDIA");
+  // GL_ARB_bindless_texture asks for one handle in all invocations that run together; this extension lifts that
+  info.handles_may_differ = info.has_extension("GL_NV_gpu_shader5");
   info.max_resident_handles = max_resident_handles(info.renderer);
   read_limits(gl, info);
+  info.total_memory_bytes = get_total_memory(gl, info);
   info.free_memory_bytes = get_free_memory(gl, info);
   return info;
 }
@@ -205,10 +213,20 @@ std::string_view context_kind_name(ContextKind kind) {
   return "";
 }
 
-ContextKind parse_context_kind(std::string_view name) {
+std::string ContextChoice::name() const {
+  return device ? fmt::format("{}{}", kDevicePrefix, *device) : std::string(context_kind_name(kind));
+}
+
+ContextChoice parse_context(std::string_view name) {
   for (ContextKind kind : kKinds)
     if (context_kind_name(kind) == name) return kind;
-  throw UsageError(fmt::format("no context {}; accepted: {}", quote(name), kKindNames));
+  if (name.starts_with(kDevicePrefix)) {
+    const std::string_view digits = name.substr(kDevicePrefix.size());
+    int device = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), device);
+    if (error == std::errc() && end == digits.data() + digits.size() && device >= 0) return {ContextKind::egl_device, device};
+  }
+  throw UsageError(fmt::format("no context {}; accepted: {}, egl_device:N", quote(name), kKindNames));
 }
 
 bool GlContextInfo::has_extension(std::string_view name) const {
@@ -218,15 +236,20 @@ bool GlContextInfo::has_extension(std::string_view name) const {
 Context::Context() : gl_(std::make_unique<GladGLContext>()), log_(std::make_unique<MessageLog>()) {}
 Context::~Context() = default;
 
-void Context::initialize(ContextKind kind, LoadFunction load, const ContextOptions& options) {
+void Context::initialize(GlContextInfo known, LoadFunction load, const ContextOptions& options) {
   const int version = gladLoadGLContext(gl_.get(), load);
   if (version == 0) throw Error("the GL functions could not be loaded");
   if (GLAD_VERSION_MAJOR(version) * 10 + GLAD_VERSION_MINOR(version) < 45)
     throw Error(fmt::format("GL {}.{} ({}), but 4.5 is needed", GLAD_VERSION_MAJOR(version), GLAD_VERSION_MINOR(version),
                             get_text(*gl_, GL_RENDERER)));
   if (options.debug) install_debug_output();
-  info_ = read_info(*gl_, kind);
+  info_ = read_info(*gl_, std::move(known));
   check("reading the context's limits");
+}
+
+std::int64_t Context::free_memory_bytes() {
+  make_current();
+  return get_free_memory(*gl_, info_);
 }
 
 void Context::install_debug_output() {
@@ -238,12 +261,15 @@ void Context::install_debug_output() {
 
 void Context::check(std::string_view what) {
   std::vector<std::string> problems = log_->take_fatal();
+  bool out_of_memory = false;
   // bounded: a lost context may report its error for ever
   for (int i = 0; i < 16; ++i) {
     const GLenum error = gl_->GetError();
     if (error == GL_NO_ERROR) break;
     problems.emplace_back(gl_error_name(error));
+    out_of_memory = out_of_memory || error == GL_OUT_OF_MEMORY;
   }
+  if (out_of_memory) throw BudgetError(fmt::format("context {}, {}: {}", info_.kind, what, fmt::join(problems, "; ")));
   if (!problems.empty()) throw Error(fmt::format("context {}, {}: {}", info_.kind, what, fmt::join(problems, "; ")));
 }
 
@@ -256,11 +282,11 @@ void Context::reserve_handles(std::int64_t count) {
 
 std::vector<std::string> Context::take_messages() { return log_->take_messages(); }
 
-std::unique_ptr<Context> make_context(ContextKind kind, const ContextOptions& options) {
+std::unique_ptr<Context> make_context(const ContextChoice& choice, const ContextOptions& options) {
   try {
-    return kind == ContextKind::osmesa ? detail::make_osmesa_context(options) : detail::make_egl_context(kind, options);
+    return choice.kind == ContextKind::osmesa ? detail::make_osmesa_context(options) : detail::make_egl_context(choice, options);
   } catch (const Error& e) {
-    throw Error(fmt::format("context {}: {}; accepted: {}", context_kind_name(kind), e.what(), kKindNames));
+    throw Error(fmt::format("context {}: {}; accepted: {}", choice.name(), e.what(), kKindNames));
   }
 }
 

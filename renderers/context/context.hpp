@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,11 +15,20 @@ struct GladGLContext;
 namespace amrtex {
 
 /// egl: Mesa's surfaceless platform, else the first EGL device that gives a context.
-/// egl_device: the first EGL device that is hardware. osmesa: Mesa's software library.
+/// egl_device: the first EGL device that is hardware, or the one that is asked for. osmesa: Mesa's software library.
 enum class ContextKind { egl, egl_device, osmesa };
 std::string_view context_kind_name(ContextKind kind);
-/// Throws a UsageError that names the accepted kinds.
-ContextKind parse_context_kind(std::string_view name);
+
+/// How a context is asked for: "egl", "egl_device", "egl_device:1" for the device of that number, "osmesa".
+struct ContextChoice {
+  ContextKind kind = ContextKind::egl;
+  std::optional<int> device;  ///< place in EGL's list; of egl_device alone
+
+  ContextChoice(ContextKind asked = ContextKind::egl, std::optional<int> number = std::nullopt) : kind(asked), device(number) {}
+  std::string name() const;
+};
+/// Throws a UsageError that names what is accepted.
+ContextChoice parse_context(std::string_view name);
 
 struct ContextOptions {
   bool debug = true;  ///< collect KHR_debug messages; check() throws either way
@@ -35,9 +45,13 @@ struct GlContextInfo : ContextInfo {
   int max_viewport_height = 0;         ///< pixels
   int max_compute_invocations = 0;     ///< in one work group
   int timer_bits = 0;                  ///< of GL_TIME_ELAPSED; 0 = no timer
-  std::int64_t free_memory_bytes = 0;  ///< as the driver reports it; 0 = no memory query
+  std::int64_t free_memory_bytes = 0;  ///< as the driver reports it when the context is made; 0 = no memory query
   bool software = false;               ///< a software rasteriser: its times stand in no table with a GPU's
   bool sparse_texture = false;
+  std::int64_t total_memory_bytes = 0;  ///< of the GPU; 0 = the driver does not tell
+  int device = -1;          ///< its place in EGL's list; negative where that is not known
+  std::string device_file;  ///< "/dev/dri/renderD128"; empty where it is not known
+  int cuda_index = -1;      ///< NVIDIA's number of the device; negative where it has none
   bool has_extension(std::string_view name) const;
 };
 
@@ -55,7 +69,10 @@ class Context {
   virtual void make_current() = 0;
   const GlContextInfo& info() const { return info_; }
   const GladGLContext& gl() const { return *gl_; }
+  /// Bytes that the driver says are free on the GPU now; 0 = it cannot be asked.
+  std::int64_t free_memory_bytes();
 
+  /// Throws BudgetError where GL has no memory left, which costs an object and not the context.
   /// Throws Error with every fatal message and GL error since the last call; `what`
   /// says what was being done. Fatal are errors and messages of high severity,
   /// except those of the shader compiler, which Program throws with file names.
@@ -72,8 +89,8 @@ class Context {
 
   Context();
   /// To be called by the kinds once their context is current: loads the functions,
-  /// checks the version, fills info().
-  void initialize(ContextKind kind, LoadFunction load, const ContextOptions& options);
+  /// checks the version, fills the rest of info().
+  void initialize(GlContextInfo known, LoadFunction load, const ContextOptions& options);
 
  private:
   void install_debug_output();
@@ -85,10 +102,10 @@ class Context {
 };
 
 /// Throws Error that says why not, and which kinds this machine may try.
-std::unique_ptr<Context> make_context(ContextKind kind, const ContextOptions& options = {});
+std::unique_ptr<Context> make_context(const ContextChoice& choice, const ContextOptions& options = {});
 
 namespace detail {  // one function a source file
-std::unique_ptr<Context> make_egl_context(ContextKind kind, const ContextOptions& options);
+std::unique_ptr<Context> make_egl_context(const ContextChoice& choice, const ContextOptions& options);
 std::unique_ptr<Context> make_osmesa_context(const ContextOptions& options);
 }  // namespace detail
 

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <exception>
 
+#include "renderers/context/egl_devices.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {
@@ -121,6 +122,9 @@ ChildResult run_in_child(const std::function<std::string()>& work, std::chrono::
 
 Json to_json(const GlContextInfo& info) {
   return {{"kind", info.kind},
+          {"device", info.device >= 0 ? Json(info.device) : Json(nullptr)},
+          {"device_file", info.device_file},
+          {"cuda_index", info.cuda_index >= 0 ? Json(info.cuda_index) : Json(nullptr)},
           {"renderer", info.renderer},
           {"vendor", info.vendor},
           {"gl_version", info.version},
@@ -141,6 +145,7 @@ Json to_json(const GlContextInfo& info) {
           {"max_viewport_height", info.max_viewport_height},
           {"max_compute_invocations", info.max_compute_invocations},
           {"timer_bits", info.timer_bits},
+          {"total_memory_bytes", info.total_memory_bytes},
           {"free_memory_bytes", info.free_memory_bytes},
           {"extensions", info.extensions}};
 }
@@ -149,6 +154,9 @@ GlContextInfo context_info_from_json(const Json& json) {
   GlContextInfo info;
   const auto read = [&](const char* key, auto& value) { json.at(key).get_to(value); };
   read("kind", info.kind);
+  if (!json.at("device").is_null()) read("device", info.device);
+  read("device_file", info.device_file);
+  if (!json.at("cuda_index").is_null()) read("cuda_index", info.cuda_index);
   read("renderer", info.renderer);
   read("vendor", info.vendor);
   read("gl_version", info.version);
@@ -169,17 +177,34 @@ GlContextInfo context_info_from_json(const Json& json) {
   read("max_viewport_height", info.max_viewport_height);
   read("max_compute_invocations", info.max_compute_invocations);
   read("timer_bits", info.timer_bits);
+  read("total_memory_bytes", info.total_memory_bytes);
   read("free_memory_bytes", info.free_memory_bytes);
   read("extensions", info.extensions);
   return info;
 }
 
-ContextProbe probe_context(ContextKind kind, std::chrono::milliseconds timeout) {
-  const ChildResult child = run_in_child([kind] { return to_json(make_context(kind)->info()).dump(); }, timeout);
+ContextProbe probe_context(const ContextChoice& choice, std::chrono::milliseconds timeout) {
+  const ChildResult child = run_in_child([&] { return to_json(make_context(choice)->info()).dump(); }, timeout);
   ContextProbe probe{child.ok, child.timed_out, child.reason, {}, child.seconds};
-  if (child.timed_out) probe.reason = fmt::format("context {}: starting gave {}", context_kind_name(kind), child.reason);
+  if (child.timed_out) probe.reason = fmt::format("context {}: starting gave {}", choice.name(), child.reason);
   if (child.ok) probe.info = context_info_from_json(Json::parse(child.text));
   return probe;
+}
+
+std::vector<ListedDevice> probe_devices(std::chrono::milliseconds timeout, std::string& reason) {
+  const ChildResult child = run_in_child(
+      [] {
+        Json list = Json::array();
+        for (const EglDevice& d : list_devices(EglLibrary()))
+          list.push_back({{"index", d.index}, {"software", d.software}, {"text", d.text()}});
+        return list.dump();
+      },
+      timeout);
+  std::vector<ListedDevice> devices;
+  if (child.ok)
+    for (const Json& d : Json::parse(child.text)) devices.push_back({d.at("index"), d.at("software"), d.at("text")});
+  reason = child.ok && devices.empty() ? "this EGL lists no devices" : child.reason;
+  return devices;
 }
 
 }  // namespace amrtex

@@ -35,6 +35,15 @@ struct ContextProbe {
 };
 
 /// make_context in a child, with the caution of run_in_child.
-ContextProbe probe_context(ContextKind kind, std::chrono::milliseconds timeout);
+ContextProbe probe_context(const ContextChoice& choice, std::chrono::milliseconds timeout);
+
+/// A device as EGL lists it, for people.
+struct ListedDevice {
+  int index = 0;
+  bool software = false;
+  std::string text;
+};
+/// In a child as well, because listing opens the driver. Empty, with `reason`, where there is no EGL or it lists none.
+std::vector<ListedDevice> probe_devices(std::chrono::milliseconds timeout, std::string& reason);
 
 }  // namespace amrtex

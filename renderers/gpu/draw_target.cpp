@@ -79,6 +79,16 @@ void DrawTarget::draw(const Program& program) const {
   context_->gl().DrawArrays(GL_TRIANGLES, 0, 3);
 }
 
+void DrawTarget::dispatch(const Program& program) const {
+  constexpr int tile = 8;  // raycast.comp
+  program.use();
+  const GladGLContext& gl = context_->gl();
+  gl.BindImageTexture(0, color_.id(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
+  if (counters_) gl.BindImageTexture(1, counters_.id(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32UI);
+  gl.DispatchCompute(static_cast<GLuint>((width_ + tile - 1) / tile), static_cast<GLuint>((height_ + tile - 1) / tile), 1);
+  gl.MemoryBarrier(GL_TEXTURE_UPDATE_BARRIER_BIT | GL_FRAMEBUFFER_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
+}
+
 Picture DrawTarget::read_picture(int channels) const {
   context_->make_current();
   const GladGLContext& gl = context_->gl();

@@ -26,6 +26,9 @@ class DrawTarget {
   /// Binds, uses the program and draws the one triangle of fullscreen.vert.
   void draw(const Program& program) const;
 
+  /// The same picture by a compute shader of 8 x 8 invocations a group, which writes images 0 (colour) and 1 (counters).
+  void dispatch(const Program& program) const;
+
   /// The first `channels` (1 or 4) of each pixel; waits for GL.
   Picture read_picture(int channels = 4) const;
   /// One uvec4 a pixel in the order of Picture; empty without counters.

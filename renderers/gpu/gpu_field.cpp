@@ -114,6 +114,13 @@ void check_field(const EncodedField& field, Context& context) {
   check_handles(field);
 }
 
+/// Drivers that can be asked are: beyond what is free they would fail, or move textures to the host's memory without a word.
+void check_memory(const EncodedField& field, Context& context) {
+  const std::int64_t free = context.free_memory_bytes();
+  const std::int64_t needed = field.memory().total();
+  if (free > 0 && needed > free) throw BudgetError(fmt::format("{} bytes, the GPU has {} free", needed, free), needed);
+}
+
 void set_sampling(const GladGLContext& gl, GLuint id, bool linear) {
   const GLint filter = linear ? GL_LINEAR : GL_NEAREST;
   gl.TextureParameteri(id, GL_TEXTURE_MIN_FILTER, filter);
@@ -149,6 +156,7 @@ GpuField::GpuField(const EncodedField& field, Context& context)
   context.make_current();
   try {
     check_field(field, context);
+    check_memory(field, context);
     const Handles handles = upload_set(field);
     for (const HostTexture& host : field.textures) {
       if (has_handle(host)) continue;
@@ -161,6 +169,8 @@ GpuField::GpuField(const EncodedField& field, Context& context)
     }
   } catch (const UnsupportedError& e) {
     throw UnsupportedError(fmt::format("encoding {}: {}", encoding_, e.what()));
+  } catch (const BudgetError& e) {
+    throw BudgetError(fmt::format("encoding {}: {}", encoding_, e.what()), field.memory().total());
   } catch (const Error& e) {
     throw Error(fmt::format("encoding {}: {}", encoding_, e.what()));
   }

@@ -33,6 +33,15 @@ Rows consumer_rows() {
                              {"mode", {"dvr"}, Otherwise::unsupported, "eight bits hold colours and no values"}}},
                   [](const Scene& s) -> Json { return slice_target_name(s.settings.slice_target); },
                   [](Scene& s, const Json& v) { s.settings.slice_target = parse_slice_target(v.get<std::string>()); }});
+  rows.push_back({{.name = "dispatch",
+                   .type = choice_type(texts_of(kDispatchNames)),
+                   .reference = AffectsReference::no,
+                   .help = "how rays are started: by fragments, or by a compute shader in tiles of 8 x 8 pixels; one picture either way",
+                   .recorded = Recorded::where_given,
+                   .column = {.label = "dispatch", .only_where_given = true},
+                   .takes = {means_nothing_unless("consumer", {"raycast"})}},
+                  [](const Scene& s) -> Json { return dispatch_name(s.settings.dispatch); },
+                  [](Scene& s, const Json& v) { s.settings.dispatch = parse_dispatch(v.get<std::string>()); }});
   return rows;
 }
 

@@ -86,6 +86,8 @@ enum class Sampling { lattice, adaptive };
 enum class Leap { off, cube, octant };
 /// Who draws: the raycaster in one pass, or one of those that draw the field's boxes one by one (box_consumer.hpp).
 enum class ConsumerKind { raycast, multipass, slices, stencil_slices };
+/// How the raycaster's rays are started: a fragment each, or tiles of 8 x 8 pixels by a compute shader. One text either way.
+enum class Dispatch { fragment, compute };
 /// What slices are blended in. Eight bits a channel are the historical control: 256 slices are off by 0.1.
 enum class SliceTarget { rgba32f, rgba8 };
 /// How the light of an interval follows from samples (docs/integrators.md). `euler` and `left` are controls
@@ -102,6 +104,7 @@ std::string_view sampling_name(Sampling sampling);
 std::string_view leap_name(Leap leap);
 std::string_view consumer_name(ConsumerKind consumer);
 std::string_view slice_target_name(SliceTarget target);
+std::string_view dispatch_name(Dispatch dispatch);
 std::string_view integrator_name(Integrator integrator);
 std::string_view output_name(Output output);
 std::string_view shading_name(Shading shading);
@@ -111,6 +114,7 @@ Sampling parse_sampling(std::string_view name);
 Leap parse_leap(std::string_view name);
 ConsumerKind parse_consumer(std::string_view name);
 SliceTarget parse_slice_target(std::string_view name);
+Dispatch parse_dispatch(std::string_view name);
 Integrator parse_integrator(std::string_view name);
 Output parse_output(std::string_view name);
 Shading parse_shading(std::string_view name);
@@ -184,6 +188,7 @@ struct RenderSettings {
   Mode mode = Mode::dvr;
   Sampling sampling = Sampling::adaptive;
   Integrator integrator = Integrator::exponential_midpoint;
+  Dispatch dispatch = Dispatch::fragment;  ///< consumer `raycast`
   double tolerance = 1e-3;          ///< error asked of every channel of a pixel; integrator `tolerance` alone
   double step = 1;                  ///< cell widths (smallest edge): of the finest level for lattice, of the region for adaptive
   int width = 512;                  ///< pixels

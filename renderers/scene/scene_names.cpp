@@ -31,6 +31,7 @@ std::string_view sampling_name(Sampling sampling) { return name_in(kSamplingName
 std::string_view leap_name(Leap leap) { return name_in(kLeapNames, leap); }
 std::string_view consumer_name(ConsumerKind consumer) { return name_in(kConsumerNames, consumer); }
 std::string_view slice_target_name(SliceTarget target) { return name_in(kSliceTargetNames, target); }
+std::string_view dispatch_name(Dispatch dispatch) { return name_in(kDispatchNames, dispatch); }
 std::string_view integrator_name(Integrator integrator) { return name_in(kIntegratorNames, integrator); }
 std::string_view output_name(Output output) { return name_in(kOutputNames, output); }
 std::string_view shading_name(Shading shading) { return name_in(kShadingNames, shading); }
@@ -40,6 +41,7 @@ Sampling parse_sampling(std::string_view name) { return value_in(kSamplingNames,
 Leap parse_leap(std::string_view name) { return value_in(kLeapNames, "leap", name); }
 ConsumerKind parse_consumer(std::string_view name) { return value_in(kConsumerNames, "consumer", name); }
 SliceTarget parse_slice_target(std::string_view name) { return value_in(kSliceTargetNames, "slice_target", name); }
+Dispatch parse_dispatch(std::string_view name) { return value_in(kDispatchNames, "dispatch", name); }
 Output parse_output(std::string_view name) { return value_in(kOutputNames, "output", name); }
 Shading parse_shading(std::string_view name) { return value_in(kShadingNames, "shading", name); }
 

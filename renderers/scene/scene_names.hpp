@@ -24,6 +24,7 @@ inline constexpr std::array<Name<ConsumerKind>, 4> kConsumerNames{{{ConsumerKind
                                                                    {ConsumerKind::multipass, "multipass"},
                                                                    {ConsumerKind::slices, "slices"},
                                                                    {ConsumerKind::stencil_slices, "stencil_slices"}}};
+inline constexpr std::array<Name<Dispatch>, 2> kDispatchNames{{{Dispatch::fragment, "fragment"}, {Dispatch::compute, "compute"}}};
 inline constexpr std::array<Name<SliceTarget>, 2> kSliceTargetNames{
     {{SliceTarget::rgba32f, "rgba32f"}, {SliceTarget::rgba8, "rgba8"}}};
 inline constexpr std::array<Name<Integrator>, 5> kIntegratorNames{{{Integrator::exponential_midpoint, "exponential_midpoint"},

@@ -340,7 +340,9 @@ void octree_stencil(IN(Region) r, IN(int) field, IN(ivec3) octant, OUT(Stencil) 
   if (AMRTEX_OCTREE_TRAVERSAL == AMRTEX_OCTREE_PAPER) {
     for (int i = 0; i < 8; ++i) v[i] = octree_descend(octree_corner(low, high, i), shift, field);
   } else {
-    // all eight go down together; one that meets a leaf stays there
+    // All eight go down together; one that meets a leaf stays there. llvmpipe keeps these arrays in registers when it has unrolled the
+    // loops over them, which have constant bounds for that; a GPU that does not unroll puts 32 numbers into local memory, and a
+    // sample then waits for it.
     int slot[8];
     int node[8];
     bool inner[8];

@@ -17,6 +17,7 @@
 #include <type_traits>
 
 #include "structures/mesh/quoted.hpp"
+#include "structures/readers/hdf5_formats.hpp"
 #include "structures/readers/memory_check.hpp"
 #include "structures/readers/reader_tools.hpp"
 
@@ -460,21 +461,7 @@ std::vector<std::pair<std::string, T>> Hdf5File::State::read_named(const std::st
   return pairs;
 }
 
-bool Hdf5File::has_signature(const fs::path& path) {
-  constexpr std::string_view kSignature("\x89HDF\r\n\x1a\n", 8);
-  std::error_code failure;
-  if (!fs::is_regular_file(path, failure) || failure) return false;
-  const std::uint64_t size = fs::file_size(path, failure);
-  std::ifstream in(path, std::ios::binary);
-  // behind a user block of 512 bytes or more, which doubles
-  for (std::uint64_t at = 0; !failure && in && at + kSignature.size() <= size; at = at == 0 ? 512 : 2 * at) {
-    std::array<char, 8> found{};
-    in.seekg(static_cast<std::streamoff>(at));
-    in.read(found.data(), found.size());
-    if (in && std::string_view(found.data(), found.size()) == kSignature) return true;
-  }
-  return false;
-}
+bool Hdf5File::has_signature(const fs::path& path) { return has_hdf5_signature(path); }
 
 Hdf5File::Hdf5File(const fs::path& path) : state_(std::make_shared<State>(path)) {
   const LibraryCall call;

@@ -10,8 +10,8 @@
 #include "structures/mesh/unfinished_folder.hpp"
 #include "structures/readers/amrex_plotfile/amrex_plotfile.hpp"
 #include "structures/readers/exabrick/exabrick.hpp"
+#include "structures/readers/hdf5_formats.hpp"
 #include "structures/readers/npz_mesh/npz_mesh.hpp"
-#include "structures/readers/vtkhdf/vtkhdf_writer.hpp"
 
 namespace amrtex {
 namespace {
@@ -27,7 +27,7 @@ constexpr WrittenFormat kWritten[] = {
     {"amrex", "", write_amrex_plotfile},
     {"exabrick", ".cells", write_exabrick},
     {"npz", ".npz", write_npz_mesh},
-    {"vtkhdf", ".vtkhdf", write_vtkhdf},
+    {"vtkhdf", ".vtkhdf", write_vtkhdf_by_module},
 };
 
 /// Whoever writes one of these means a file, not a plotfile's folder of that name.
@@ -56,7 +56,14 @@ void write_mesh(const AmrHierarchy& hierarchy, const std::filesystem::path& path
   format_of(path, format).write(hierarchy, path);
 }
 
-void require_writable_format(const std::filesystem::path& path, std::string_view format) { format_of(path, format); }
+void require_writable_format(const std::filesystem::path& path, std::string_view format) {
+  if (format_of(path, format).write != write_vtkhdf_by_module) return;
+  try {
+    hdf5_formats();
+  } catch (const Error& e) {
+    throw Error(fmt::format("{}: vtkhdf is written over HDF5: {}", path.string(), e.what()));
+  }
+}
 
 std::string written_formats() {
   std::string names;
