@@ -118,7 +118,7 @@ class Commands(unittest.TestCase):
         commands = commands_of(ROOT / "docs" / page)
         self.assertTrue(commands)
         with tempfile.TemporaryDirectory() as folder:
-            for name in ("data", "experiments"):
+            for name in ("data", "docs", "experiments"):
                 os.symlink(ROOT / name, pathlib.Path(folder) / name)
             os.mkdir(pathlib.Path(folder) / "out")
             for command in commands:
@@ -141,6 +141,11 @@ class Commands(unittest.TestCase):
         if not draws():
             self.skipTest("no GL context")
         self.run_all("color_maps.md")
+
+    def test_every_command_of_the_figures_works(self):
+        if not draws():
+            self.skipTest("no GL context")
+        self.run_all("figures.md")
 
 
 class Numbers(unittest.TestCase):

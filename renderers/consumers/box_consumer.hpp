@@ -29,6 +29,7 @@ class BoxConsumer final : public Consumer {
   FrameTime draw() override;
   Picture read() const override;
   WorkCounts count() override;
+  std::vector<PixelWork> count_pixels() override;
   const std::string& shader_hash() const override { return program_.hash(); }
   bool transfer_exact() const override { return resources_.transfer_exact(); }
 
