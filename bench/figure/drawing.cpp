@@ -107,6 +107,7 @@ class Painter {
     cairo_set_line_join(cairo_, l.closed ? CAIRO_LINE_JOIN_MITER : CAIRO_LINE_JOIN_ROUND);
     cairo_set_line_cap(cairo_, CAIRO_LINE_CAP_ROUND);
     cairo_move_to(cairo_, l.points.front().x, l.points.front().y);
+    if (l.points.size() == 1) cairo_line_to(cairo_, l.points[0].x, l.points[0].y);
     for (std::size_t i = 1; i < l.points.size(); ++i) cairo_line_to(cairo_, l.points[i].x, l.points[i].y);
     if (l.closed) cairo_close_path(cairo_);
     cairo_stroke(cairo_);

@@ -37,7 +37,7 @@ struct FilledArea {
   Ink ink;
 };
 struct Line {
-  std::vector<Point> points;
+  std::vector<Point> points;  ///< one alone is a dot
   bool closed = false;
   Ink ink;
   double width = 0.2;  ///< mm

@@ -19,6 +19,8 @@ namespace {
 /// Told apart by people who see few colours, on light and on dark pictures.
 constexpr std::array<std::string_view, 8> kLevelColors = {"#8d96a5", "#e69f00", "#d1432b", "#0072b2",
                                                           "#009e73", "#cc79a7", "#56b4e9", "#f0e442"};
+constexpr double kRayWidth = 0.15;      ///< mm, and
+constexpr double kSampleWidth = 1.0;    ///< of a dot
 constexpr double kHiddenWidth = 0.5;    ///< of an edge behind its own box, of the line's
 constexpr double kHiddenOpacity = 0.4;  ///< likewise
 
@@ -107,6 +109,19 @@ class Projection {
 bool meets_picture(const std::array<Point, 2>& line) {
   const auto apart = [](double a, double b) { return (a < 0 && b < 0) || (a > 1 && b > 1); };
   return !apart(line[0].x, line[1].x) && !apart(line[0].y, line[1].y);
+}
+
+/// `place`: a line's ends in parts of the picture, where it can be seen.
+template <class Place>
+std::vector<Line> ray_lines(const RayPlaces& ray, const RaySpec& spec, Place&& place) {
+  std::vector<Line> lines;
+  if (const auto line = place(ray.from, ray.to))
+    lines.push_back({{(*line)[0], (*line)[1]}, false, {0.1, 0.1, 0.1, 1}, kRayWidth});
+  for (const Vec3d& sample : ray.samples)
+    if (const auto dot = place(sample, sample))
+      for (const auto& [ink, width] : {std::pair{Ink{1, 1, 1, 1}, kSampleWidth + kRayWidth}, {ink_of(spec.color), kSampleWidth}})
+        lines.push_back({{(*dot)[0]}, false, ink, width});
+  return lines;
 }
 
 /// Edges of boxes, each once a level.
@@ -224,6 +239,20 @@ std::vector<Line> cut_boxes(const DomainGeometry& geometry, const std::vector<Le
     lines.push_back({{{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}}, true, level_ink(overlay, b.level), overlay.line});
   }
   return lines;
+}
+
+std::vector<Line> seen_ray(const RayPlaces& ray, const Scene& scene, const RaySpec& spec) {
+  const Projection projection(scene);
+  return ray_lines(ray, spec, [&](const Vec3d& a, const Vec3d& b) { return projection.line(a, b); });
+}
+
+std::vector<Line> cut_ray(const DomainGeometry& geometry, const RayPlaces& ray, const CutPlane& plane, const RaySpec& spec) {
+  const std::array<int, 2> axes = slice_axes(plane.axis);
+  const auto place = [&](const Vec3d& p) {
+    const Vec3d part = (p - geometry.lower) / geometry.size();
+    return Point{part[axes[0]], 1 - part[axes[1]]};
+  };
+  return ray_lines(ray, spec, [&](const Vec3d& a, const Vec3d& b) { return std::optional(std::array{place(a), place(b)}); });
 }
 
 }  // namespace amrtex

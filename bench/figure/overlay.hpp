@@ -46,4 +46,14 @@ std::vector<Line> seen_boxes(const DomainGeometry& geometry, const std::vector<L
 std::vector<Line> cut_boxes(const DomainGeometry& geometry, const std::vector<LevelBox>& boxes, const CutPlane& plane, int layer,
                             const OverlaySpec& overlay);
 
+/// Places of a ray, world.
+struct RayPlaces {
+  Vec3d from, to;
+  std::vector<Vec3d> samples;
+};
+/// A line along it and a dot at each sample.
+std::vector<Line> seen_ray(const RayPlaces& ray, const Scene& scene, const RaySpec& spec);
+/// As its shadow on a plane.
+std::vector<Line> cut_ray(const DomainGeometry& geometry, const RayPlaces& ray, const CutPlane& plane, const RaySpec& spec);
+
 }  // namespace amrtex

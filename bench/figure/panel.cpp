@@ -16,6 +16,7 @@
 #include "bench/records/record_file.hpp"
 #include "bench/records/stored_picture.hpp"
 #include "bench/settings/default_scene.hpp"
+#include "renderers/cpu/structure_view.hpp"
 #include "renderers/scene/background.hpp"
 #include "structures/mesh/quoted.hpp"
 #include "structures/readers/mesh_io.hpp"
@@ -202,6 +203,32 @@ void add_overlays(const PanelSpec& panel, SceneDrawing& drawing, PanelContent& c
   std::sort(content.key.begin(), content.key.end(), [](const LevelKey& a, const LevelKey& b) { return a.level < b.level; });
 }
 
+/// In the structure that the scene draws, where nothing is skipped.
+RayPlaces places_of(const RaySpec& spec, const SceneDrawing& drawing) {
+  RayPlaces ray;
+  for (int axis = 0; axis < 3; ++axis) {
+    ray.from[axis] = spec.from[static_cast<std::size_t>(axis)];
+    ray.to[axis] = spec.to[static_cast<std::size_t>(axis)];
+  }
+  const HierarchyReference filter = drawing.filter();
+  const FieldValues values = [&](const FinestPosition& p, int) { return filter.sample(p); };
+  const WorldRay line{ray.from, glm::normalize(ray.to - ray.from)};
+  for (const SamplePlace& p :
+       list_samples(drawing.mesh(), drawing.field(false), values, line, parse_sampling(spec.sampling), spec.step))
+    ray.samples.push_back(p.position);
+  return ray;
+}
+
+void add_rays(const PanelSpec& panel, const SceneDrawing& drawing, PanelContent& content) {
+  for (const RaySpec& spec : panel.rays) {
+    const RayPlaces ray = places_of(spec, drawing);
+    const std::vector<Line> lines = panel.show == Show::slice
+                                        ? cut_ray(drawing.mesh(), ray, plane_of(panel, drawing.mesh()), spec)
+                                        : seen_ray(ray, drawing.scene(), spec);
+    content.lines.insert(content.lines.end(), lines.begin(), lines.end());
+  }
+}
+
 std::string heat_quantity(Show show) {
   return show == Show::error ? "picture \xE2\x88\x92 reference" : std::string(show_name(show));
 }
@@ -222,6 +249,7 @@ PanelContent make_panel(const PanelSpec& panel, Scenes& scenes) {
   content.is_signed = panel.show == Show::error;
   if (panel.show == Show::level) content.finest_level = scenes.of(panel).mesh().finest_level();
   if (!panel.overlays.empty()) add_overlays(panel, scenes.of(panel), content);
+  if (!panel.rays.empty()) add_rays(panel, scenes.of(panel), content);
   if (stored && panel.scale_bar) content.world_width = world_width(scenes.of(panel).scene(), scenes.of(panel).mesh());
   if (panel.scale_bar && !(*panel.scale_bar < content.world_width))
     throw UsageError(fmt::format("'scale_bar' {:.6g}: the panel shows {:.6g} world units; accepted: less", *panel.scale_bar,

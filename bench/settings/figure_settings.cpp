@@ -130,6 +130,23 @@ const SettingTable<InsetSpec>& inset_table() {
   return table;
 }
 
+const SettingTable<RaySpec>& ray_table() {
+  using R = RaySpec;
+  const auto end = [](Setting<R> row) {
+    row.key.required = true;
+    return row;
+  };
+  const ValueType place = list_of(number_type(), 3, "three numbers [x, y, z]");
+  static const SettingTable<R> table{"rays",
+                                     {end(row<R, &R::from>("from", place, "where it begins", "world units")),
+                                      end(row<R, &R::to>("to", place, "where its line ends", "world units")),
+                                      row<R, &R::sampling>("sampling", choice_type({"lattice", "adaptive"}),
+                                                           "which places are marked ([sampling](sampling.md))"),
+                                      row<R, &R::step>("step", number_above(0), "as `step` of a scene", "cell widths"),
+                                      row<R, &R::color>("color", text_type(), "of the marks, \"#rrggbb\"")}};
+  return table;
+}
+
 Setting<PanelSpec> show_row() {
   return {
       {.name = "show",
@@ -213,9 +230,9 @@ const std::vector<Key>& structure_keys() {
                .default_text = required ? "" : "none",
                .required = required};
   };
-  static const std::vector<Key> keys = {key("panels", "a list of [panels](#panels)", true),
-                                        key("overlays", "a list of [overlays](#overlays)", false),
-                                        key("insets", "a list of [insets](#insets)", false)};
+  static const std::vector<Key> keys = {
+      key("panels", "a list of [panels](#panels)", true), key("overlays", "a list of [overlays](#overlays)", false),
+      key("rays", "a list of [rays](#rays)", false), key("insets", "a list of [insets](#insets)", false)};
   return keys;
 }
 
@@ -248,6 +265,13 @@ OverlaySpec parse_overlay(const JsonNode& node) {
   return overlay;
 }
 
+RaySpec parse_ray(const JsonNode& node) {
+  RaySpec ray = parse_object(node, ray_table());
+  if (node.find("color")) require_color(node.require("color"), ray.color);
+  if (ray.from == ray.to) node.require("to").fail("a ray of no length; accepted: another place than 'from'");
+  return ray;
+}
+
 InsetSpec parse_inset(const JsonNode& node) {
   InsetSpec inset = parse_object(node, inset_table());
   if (node.find("color")) require_color(node.require("color"), inset.color);
@@ -271,7 +295,7 @@ void require_source(const JsonNode& node, const JsonFile& file, PanelSpec& panel
   belongs("where", {"records"});
   belongs("set", {"scene", "data", "records"});
   for (const std::string_view key : {"field", "view", "size"}) belongs(key, {"data"});
-  for (const std::string_view key : {"overlays", "scale_bar"}) belongs(key, {"scene", "data", "records"});
+  for (const std::string_view key : {"overlays", "rays", "scale_bar"}) belongs(key, {"scene", "data", "records"});
   if (given[0] == "file" && panel.show != Show::picture)
     node.require("show").fail(fmt::format("of a file there is the picture alone; accepted: {}", show_name(Show::picture)));
   std::string* const places[] = {&panel.scene, &panel.data, &panel.records, &panel.file};
@@ -280,11 +304,12 @@ void require_source(const JsonNode& node, const JsonFile& file, PanelSpec& panel
 }
 
 PanelSpec parse_panel(const JsonNode& node, const JsonFile& file) {
-  PanelSpec panel = parse_object(node, panel_table(), {"overlays", "insets"});
+  PanelSpec panel = parse_object(node, panel_table(), {"overlays", "rays", "insets"});
   panel.place = file.position(node.place()) + node.place();
   for (const std::string_view key : {"axis", "at", "pixels"})
     if (const auto found = node.find(key); found && panel.show != Show::slice) found->fail("goes with 'show' slice");
   for (const JsonNode& item : list_at(node, "overlays")) panel.overlays.push_back(parse_overlay(item));
+  for (const JsonNode& item : list_at(node, "rays")) panel.rays.push_back(parse_ray(item));
   for (const JsonNode& item : list_at(node, "insets")) panel.insets.push_back(parse_inset(item));
   require_source(node, file, panel);
   return panel;
@@ -313,9 +338,11 @@ std::span<const Section> figure_sections() {
     for (const Key* key : figure_table().keys()) figure.push_back(key);
     panels.push_back(&structure_keys()[1]);
     panels.push_back(&structure_keys()[2]);
+    panels.push_back(&structure_keys()[3]);
     return std::vector<Section>{{"figure", "", figure},
                                 {"panels", "panels", panels},
                                 {"overlays", "panels.overlays", overlay_table().keys()},
+                                {"rays", "panels.rays", ray_table().keys()},
                                 {"insets", "panels.insets", inset_table().keys()}};
   }();
   return sections;

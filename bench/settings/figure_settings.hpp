@@ -25,6 +25,14 @@ struct OverlaySpec {
   double opacity = 1;
 };
 
+/// A ray, and where the march samples it in the scene's structure.
+struct RaySpec {
+  std::array<double, 3> from{}, to{};  ///< world
+  std::string sampling = "adaptive";
+  double step = 1;  ///< as `render.step`
+  std::string color = "#1f4e9c";
+};
+
 /// A part of a panel's picture, enlarged over one of its corners.
 struct InsetSpec {
   std::array<double, 4> box{};  ///< left, top, right, bottom; parts of the picture's width and height
@@ -48,12 +56,13 @@ struct PanelSpec {
   std::optional<std::array<double, 2>> range;
   bool logarithmic = false;
   bool color_bar = true;
-  std::string bar_label;            ///< empty: what is shown
-  std::optional<double> scale_bar;  ///< world length
-  std::string scale_label;          ///< empty: its length
+  std::string bar_label;             ///< empty: what is shown
+  std::optional<double> scale_bar;   ///< world length
+  std::string scale_label;           ///< empty: its length
   std::string background = "scene";  ///< scene, white or black
   bool level_key = true;             ///< what the colours of levels mean, below overlays
   std::vector<OverlaySpec> overlays;
+  std::vector<RaySpec> rays;
   std::vector<InsetSpec> insets;
   std::string place;  ///< "figure.json:12: panels[1]"
 };
@@ -75,7 +84,7 @@ struct FigureSpec {
 /// Throws UsageErrors that name file, line and key, and Error where the file cannot be read.
 FigureSpec read_figure(const std::filesystem::path& path);
 
-/// Keys of these files, as all_sections() has those of experiments: figure, panels, overlays, insets.
+/// Keys of these files, as all_sections() has those of experiments: figure, panels, overlays, rays, insets.
 std::span<const Section> figure_sections();
 
 }  // namespace amrtex
