@@ -13,6 +13,7 @@
 #include <cmath>
 #include <csetjmp>
 #include <cstring>
+#include <limits>
 #include <sstream>
 
 #include "structures/mesh/error.hpp"
@@ -276,13 +277,15 @@ std::string svg_file(const Drawing& drawing) {
 
 std::string png_file(const Drawing& drawing, double dpi) {
   const double per_mm = dpi / 25.4;
-  const double width = std::ceil(drawing.width * per_mm), height = std::ceil(drawing.height * per_mm);
+  const double width = std::ceil(drawing.width * per_mm - 1e-6), height = std::ceil(drawing.height * per_mm - 1e-6);
   if (!(width >= 1 && height >= 1 && width <= kMostFigurePixels && height <= kMostFigurePixels))
     throw UsageError(fmt::format("{:.4g} x {:.4g} mm at {:.4g} dpi are {:.0f} x {:.0f} pixels; accepted: 1 to {} a side",
                                  drawing.width, drawing.height, dpi, width, height, kMostFigurePixels));
   const SurfacePointer surface(cairo_image_surface_create(CAIRO_FORMAT_RGB24, static_cast<int>(width), static_cast<int>(height)));
   check(cairo_surface_status(surface.get()));
   const CairoPointer cairo(cairo_create(surface.get()));
+  cairo_set_source_rgb(cairo.get(), 1, 1, 1);  // the last row and column may be parts of pixels
+  cairo_paint(cairo.get());
   cairo_scale(cairo.get(), per_mm, per_mm);
   Painter(cairo.get(), drawing, per_mm).paint();
   cairo_surface_flush(surface.get());

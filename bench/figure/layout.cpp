@@ -74,8 +74,8 @@ class Layout {
   // --- sizes ---
 
   void make_ticks(Cell& cell, double length) const {
-    const double each = bars_right() ? 2.2 * ruler_.line_height() : 5 * ruler_.line_height();
-    cell.ticks = cell.scale->ticks(std::clamp(static_cast<int>(length / each), 2, 8));
+    const double each = bars_right() ? 2.2 * ruler_.line_height() : 3.5 * ruler_.line_height();
+    cell.ticks = cell.scale->ticks(std::clamp(static_cast<int>(length / each), 3, 8));
   }
   /// Of a bar at the right and its numbers, with the gap before it.
   double bar_space(const Cell& cell) const {
@@ -125,9 +125,9 @@ class Layout {
   double bar_below(const Cell& cell) const {
     return cell.has_bar && !bars_right() ? kPad + kBarWidth + kTick + 2.1 * ruler_.line_height() : 0;
   }
-  double key_height(const Cell& cell) const { return cell.content->key.empty() ? 0 : kPad / 2 + ruler_.line_height(); }
+  double key_height(const Cell& cell) const { return cell.content->key.empty() ? 0 : kPad + ruler_.line_height(); }
   double caption_height(const Cell& cell) const {
-    return cell.caption.empty() ? 0 : kPad / 2 + ruler_.line_height() * static_cast<double>(cell.caption.size());
+    return cell.caption.empty() ? 0 : kPad + ruler_.line_height() * static_cast<double>(cell.caption.size());
   }
 
   void place_rows() {
@@ -184,7 +184,7 @@ class Layout {
   }
 
   void draw_caption(const Cell& cell, double top) {
-    double base = top + kPad / 2 + ruler_.ascent();
+    double base = top + kPad + ruler_.ascent();
     for (const std::string& line : cell.caption) {
       text({cell.picture.left, base}, line);
       base += ruler_.line_height();
@@ -192,7 +192,7 @@ class Layout {
   }
 
   void draw_key(const Cell& cell, double top) {
-    const double base = top + kPad / 2 + ruler_.ascent(), swatch = ruler_.ascent();
+    const double base = top + kPad + ruler_.ascent(), swatch = ruler_.ascent();
     double x = cell.picture.left;
     if (cell.content->key.empty()) return;
     text({x, base}, "level");
@@ -311,12 +311,13 @@ class Layout {
   void draw_scale_bar(const Cell& cell) {
     const double length = *cell.spec->scale_bar / cell.content->world_width * cell.picture.width;
     const Point from{cell.picture.left + 2, cell.picture.bottom() - 2};
-    const Ink dark{0, 0, 0, 0.75}, light{1, 1, 1, 1};
-    drawing_.add(Line{{from, {from.x + length, from.y}}, false, dark, 1.1}, cell.picture);
-    drawing_.add(Line{{from, {from.x + length, from.y}}, false, light, 0.6}, cell.picture);
+    const bool on_light = lightness(cell.content->background) > 50;
+    const Ink rim = on_light ? Ink{1, 1, 1, 1} : Ink{0, 0, 0, 0.75}, ink = on_light ? kBlack : Ink{1, 1, 1, 1};
+    drawing_.add(Line{{from, {from.x + length, from.y}}, false, rim, 1.1}, cell.picture);
+    drawing_.add(Line{{from, {from.x + length, from.y}}, false, ink, 0.6}, cell.picture);
     const std::string label = printable(cell.spec->scale_label.empty() ? number_text(fmt::format("{:.4g}", *cell.spec->scale_bar))
                                                                        : cell.spec->scale_label);
-    drawing_.add(Text{{from.x, from.y - 1.2}, label, light, Anchor::start, false, dark}, cell.picture);
+    drawing_.add(Text{{from.x, from.y - 1.2}, label, ink, Anchor::start, false, rim}, cell.picture);
   }
 
   const FigureSpec& figure_;
@@ -332,7 +333,11 @@ class Layout {
 Drawing lay_out(const FigureSpec& figure, const std::vector<PanelContent>& panels) { return Layout(figure, panels).draw(); }
 
 std::string figure_file(const FigureSpec& figure, const std::string& extension) {
-  const TextRuler font(figure.font, figure.font_size);  // refused before anything is drawn
+  try {
+    const TextRuler font(figure.font, figure.font_size);  // refused before anything is drawn
+  } catch (const UsageError& e) {
+    throw UsageError(fmt::format("{}: {}", clipped(figure.file.string()), e.what()));
+  }
   const Drawing drawing = lay_out(figure, make_panels(figure));
   if (extension == ".svg") return svg_file(drawing);
   return extension == ".pdf" ? pdf_file(drawing) : png_file(drawing, figure.dpi);

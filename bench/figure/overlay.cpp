@@ -225,15 +225,17 @@ std::vector<Line> seen_boxes(const DomainGeometry& geometry, const std::vector<L
   return edges.lines();
 }
 
-std::vector<Line> cut_boxes(const DomainGeometry& geometry, const std::vector<LevelBox>& boxes, const CutPlane& plane, int layer,
+std::vector<LevelBox> boxes_in_layer(std::vector<LevelBox> boxes, int axis, int layer) {
+  std::erase_if(boxes, [&](const LevelBox& b) { return layer < b.cells.lower[axis] || layer >= b.cells.upper[axis]; });
+  return boxes;
+}
+
+std::vector<Line> cut_boxes(const DomainGeometry& geometry, const std::vector<LevelBox>& boxes, int axis,
                             const OverlaySpec& overlay) {
-  std::vector<LevelBox> met;
-  std::copy_if(boxes.begin(), boxes.end(), std::back_inserter(met),
-               [&](const LevelBox& b) { return b.cells.lower[plane.axis] <= layer && layer < b.cells.upper[plane.axis]; });
-  const auto [right, up] = slice_axes(plane.axis);
+  const auto [right, up] = slice_axes(axis);
   const double width = geometry.cells[right], height = geometry.cells[up];
   std::vector<Line> lines;
-  for (const LevelBox& b : chosen(std::move(met), overlay)) {
+  for (const LevelBox& b : chosen(boxes, overlay)) {
     const double x0 = b.cells.lower[right] / width, x1 = b.cells.upper[right] / width;
     const double y0 = 1 - b.cells.upper[up] / height, y1 = 1 - b.cells.lower[up] / height;
     lines.push_back({{{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}}, true, level_ink(overlay, b.level), overlay.line});

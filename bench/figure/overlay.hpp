@@ -35,6 +35,9 @@ std::array<int, 2> slice_axes(int axis);
 /// The index of the finest cells that a plane cuts.
 int cut_layer(const AmrHierarchy& mesh, const CutPlane& plane);
 
+/// Those that the layer cuts.
+std::vector<LevelBox> boxes_in_layer(std::vector<LevelBox> boxes, int axis, int layer);
+
 /// The colour of a level.
 Ink level_ink(const OverlaySpec& overlay, int level);
 
@@ -42,8 +45,8 @@ Ink level_ink(const OverlaySpec& overlay, int level);
 /// As the scene's camera sees them: edges that lie behind their own box first, and thin; then the others, far boxes first.
 std::vector<Line> seen_boxes(const DomainGeometry& geometry, const std::vector<LevelBox>& boxes, const Scene& scene,
                              const OverlaySpec& overlay);
-/// Where a plane cuts them, as exact rectangles, coarse ones first.
-std::vector<Line> cut_boxes(const DomainGeometry& geometry, const std::vector<LevelBox>& boxes, const CutPlane& plane, int layer,
+/// Boxes of one layer across an axis, as exact rectangles, coarse ones first.
+std::vector<Line> cut_boxes(const DomainGeometry& geometry, const std::vector<LevelBox>& boxes, int axis,
                             const OverlaySpec& overlay);
 
 /// Places of a ray, world.

@@ -13,6 +13,7 @@
 #include "bench/measure/scene_data.hpp"
 #include "bench/measure/scene_drawing.hpp"
 #include "bench/records/point_query.hpp"
+#include "bench/records/record.hpp"
 #include "bench/records/record_file.hpp"
 #include "bench/records/stored_picture.hpp"
 #include "bench/settings/default_scene.hpp"
@@ -110,7 +111,8 @@ void show_record(const PanelSpec& panel, PanelContent& content) {
   const bool volume = look.settings.draws_volume() && !look.transfer_function.color.empty();
   content.background = background_of(panel, volume ? background_for(look) : Vec3d(1));
   if (volume && content.picture.channels == 4) content.colors = look.transfer_function;
-  content.quantity = shown_quantity(look, record.at("dataset").value("field", std::string("value")));
+  const Json& field = value_at(record, "/dataset/field");
+  content.quantity = shown_quantity(look, field.is_string() ? field.get<std::string>() : "value");
 }
 
 void show_file(const PanelSpec& panel, PanelContent& content) {
@@ -187,13 +189,13 @@ void add_overlays(const PanelSpec& panel, SceneDrawing& drawing, PanelContent& c
   const AmrHierarchy& mesh = drawing.mesh();
   for (const OverlaySpec& overlay : panel.overlays) {
     const bool of_structure = overlay.boxes == "regions" || overlay.boxes == "nodes";
-    const std::vector<LevelBox> boxes = of_structure
-                                            ? structure_boxes(mesh, drawing.field(overlay.boxes == "nodes"), overlay.boxes)
-                                            : mesh_boxes(mesh, overlay.boxes);
+    std::vector<LevelBox> boxes = of_structure ? structure_boxes(mesh, drawing.field(overlay.boxes == "nodes"), overlay.boxes)
+                                               : mesh_boxes(mesh, overlay.boxes);
     std::vector<Line> lines;
     if (panel.show == Show::slice) {
       const CutPlane plane = plane_of(panel, mesh);
-      lines = cut_boxes(mesh, boxes, plane, cut_layer(mesh, plane), overlay);
+      boxes = boxes_in_layer(std::move(boxes), plane.axis, cut_layer(mesh, plane));
+      lines = cut_boxes(mesh, boxes, plane.axis, overlay);
     } else {
       lines = seen_boxes(mesh, boxes, drawing.scene(), overlay);
     }
