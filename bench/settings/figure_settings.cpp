@@ -92,9 +92,9 @@ const SettingTable<OverlaySpec>& overlay_table() {
   using O = OverlaySpec;
   static const SettingTable<O> table{
       "overlays",
-      {row<O, &O::boxes>(
-           "boxes", choice_type(texts(kBoxNames)),
-           "`patches` and leaf `cells` of the mesh; `regions` and `nodes` of the scene's encoding, see below; the `domain`"),
+      {row<O, &O::boxes>("boxes", choice_type(texts(kBoxNames)),
+                         "`patches` and leaf `cells` of the mesh; `regions` and `nodes` of the scene's encoding; the `domain` "
+                         "([what is drawn](#a-mesh-over-its-picture))"),
        row<O, &O::levels>(
            "levels",
            [] {
@@ -183,9 +183,9 @@ std::vector<Setting<PanelSpec>> source_rows() {
                           "", "none"),
       row<P, &P::file>("file", text_type(), "a picture that `amrtex render` wrote as `.npy`", "", "none"),
       row<P, &P::where>("where", text_type(),
-                        "of `records`: a [condition](experiments.md#choosing-points) that leaves one of them", "", "none"),
+                        "of `records`: a [condition](experiments.md) that leaves one of them", "", "none"),
       row<P, &P::set>("set", texts_type("a list of texts \"key=value\""),
-                      "of `scene`, `data`, `records`: as [`--set`](experiments.md#--set)", "", "none"),
+                      "of `scene`, `data`, `records`: as [`--set`](experiments.md)", "", "none"),
       row<P, &P::field>("field", text_type(), "of `data`", "", "the first"),
       row<P, &P::view>("view", choice_type(texts(framing_names())), "of `data`: from where it is seen"),
       row<P, &P::size>("size", list_of(integer_type(1, kMostPixels), 2, "two numbers [width, height]"), "of `data`", "pixels")};
@@ -224,15 +224,16 @@ const SettingTable<PanelSpec>& panel_table() {
 const std::vector<Key>& structure_keys() {
   const auto key = [](std::string name, std::string help, bool required) {
     return Key{.name = std::move(name),
-               .type = object_type({}),
+               .type = list_of(object_type({}), 0, "a list of objects"),
                .reference = AffectsReference::no,
                .help = std::move(help),
                .default_text = required ? "" : "none",
                .required = required};
   };
-  static const std::vector<Key> keys = {
-      key("panels", "a list of [panels](#panels)", true), key("overlays", "a list of [overlays](#overlays)", false),
-      key("rays", "a list of [rays](#rays)", false), key("insets", "a list of [insets](#insets)", false)};
+  static const std::vector<Key> keys = {key("panels", "what stands in the figure, row by row: [panels](#panels)", true),
+                                        key("overlays", "boxes over it: [overlays](#overlays)", false),
+                                        key("rays", "and where they are sampled: [rays](#rays)", false),
+                                        key("insets", "parts of it, enlarged: [insets](#insets)", false)};
   return keys;
 }
 
