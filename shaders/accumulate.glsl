@@ -57,7 +57,7 @@ STRUCT Accumulation {
   real spent;          // ... and the bound of the error so far
   vec4r surface;       // depth: world distance to the first surface; normal: its normal, 1
   bool probing;        // a secondary ray that looks for surfaces and gathers nothing
-  ivec3 counted;       // samples, regions, regions skipped
+  ivec4 counted;       // samples, regions, regions skipped, 1 + finest level of a sample
 };
 
 Accumulation empty_accumulation() {
@@ -84,7 +84,7 @@ Accumulation empty_accumulation() {
   a.spent = real(0);
   a.surface = vec4r(0);
   a.probing = false;
-  a.counted = ivec3(0);
+  a.counted = ivec4(0);
   return a;
 }
 

@@ -78,7 +78,7 @@ vec4r fields_transfer(IN(Region) r, IN(vec3r) q) {
 
 // One interval of `length` with its sample at q.
 void take_fields(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q, IN(real) length) {
-  if (AMRTEX_COUNT != 0) a.counted.x += 1;
+  count_samples(a, r, 1);
   vec4r light = fields_transfer(r, q);
   PRECISE real depth = min(light.w * length, real(1e4));  // as interval_light()
   if (depth > real(0)) add_light(a, vec4r(light.x, light.y, light.z, depth));

@@ -34,6 +34,6 @@ void main() {
 #endif
   imageStore(img_color, pixel, color);
 #if AMRTEX_COUNT
-  imageStore(img_counted, pixel, uvec4(uvec3(a.counted), met ? 1u : 0u));
+  imageStore(img_counted, pixel, uvec4(a.counted + ivec4(0, 0, 0, met ? 1 : 0)));
 #endif
 }

@@ -21,6 +21,6 @@ void main() {
   if (met) color = march_ray(ray, a);
   out_color = color;
 #if AMRTEX_COUNT
-  out_counted = uvec4(uvec3(a.counted), met ? 1u : 0u);
+  out_counted = uvec4(a.counted + ivec4(0, 0, 0, met ? 1 : 0));  // of the last: 0 where the ray passes the domain
 #endif
 }

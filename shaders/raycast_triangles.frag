@@ -19,6 +19,6 @@ void main() {
   bool met = false;
   out_color = march_to_triangle(gl_FragCoord.xy, a, met);
 #if AMRTEX_COUNT
-  out_counted = uvec4(uvec3(a.counted), met ? 1u : 0u);
+  out_counted = uvec4(a.counted + ivec4(0, 0, 0, met ? 1 : 0));  // of the last: 0 where the ray passes the domain
 #endif
 }

@@ -6,6 +6,15 @@ DEFINE_INT(AMRTEX_COUNT)       // 1 where samples and regions are counted, else 
 DEFINE_INT(AMRTEX_RAY_DOUBLE)  // 1 where rays are held in double, else 0
 DEFINE_INT(AMRTEX_TRANSFERS)   // fields of the volume, each with a transfer function; 1 leaves out what several need
 #define AMRTEX_SEVERAL_FIELDS (AMRTEX_TRANSFERS > 1)
+
+// Samples of a region.
+void count_samples(INOUT(Accumulation) a, IN(Region) r, IN(int) count) {
+  if (AMRTEX_COUNT == 0) return;
+  a.counted.x += count;
+  if (AMRTEX_OCCLUSION != 0 && a.probing) return;  // of another ray than the pixel's
+  a.counted.w = max(a.counted.w, AMRTEX_LEAF_LEVEL(r) + 1);
+}
+
 #if AMRTEX_CPP || AMRTEX_SEVERAL_FIELDS
 #include "fields.glsl"
 #endif
@@ -49,7 +58,7 @@ void take_sample(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q, IN(real) leng
     return;
   }
   real value = fetch_field(r, q);
-  if (AMRTEX_COUNT != 0) a.counted.x += 1;
+  count_samples(a, r, 1);
   bool missing = AMRTEX_VALIDITY != 0 && is_no_value(value);
   if (AMRTEX_ISOVALUES != 0) {
     note_side(a, missing, value, begin, at);
@@ -78,7 +87,7 @@ void take_sample(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q, IN(real) leng
 #define AMRTEX_STENCILS (AMRTEX_CELL_REGIONS && AMRTEX_FILTER != AMRTEX_FILTER_NEAREST && !AMRTEX_SEVERAL_FIELDS)
 void take_constant_samples(INOUT(Accumulation) a, IN(Region) r, IN(real) count, IN(real) length, IN(ray_real) begin, IN(ray_real) way) {
   real value = fetch_field(r, vec3r(0.5));
-  if (AMRTEX_COUNT != 0) a.counted.x += int(count);
+  count_samples(a, r, int(count));
   bool missing = AMRTEX_VALIDITY != 0 && is_no_value(value);
   if (AMRTEX_ISOVALUES != 0) {
     note_side(a, missing, value, begin, begin + way * ray_real(0.5));
@@ -102,7 +111,7 @@ void take_constant_samples(INOUT(Accumulation) a, IN(Region) r, IN(real) count, 
 
 void take_stencil_sample(INOUT(Accumulation) a, IN(Region) r, IN(Stencil) s, IN(ivec3) octant, IN(vec3r) q, IN(real) length,
                          IN(ray_real) begin, IN(ray_real) at) {
-  if (AMRTEX_COUNT != 0) a.counted.x += 1;
+  count_samples(a, r, 1);
   real value = stencil_value(s, 0, octant, q);
   if (AMRTEX_ISOVALUES != 0) {
     note_side(a, false, value, begin, at);

@@ -73,7 +73,7 @@ real lamp_transmittance(INOUT(Accumulation) a, IN(Position) place) {
       more = next < ray.length;
       if (!more) length = real(max(ray.length - t, ray_real(0)));
       bool skipped = !inside || (AMRTEX_SKIP != 0 && AMRTEX_VALUE_RANGES != 0 && !transfer_visible(r.value_range));
-      if (AMRTEX_COUNT != 0) a.counted += ivec3(0, 1, skipped ? 1 : 0);
+      if (AMRTEX_COUNT != 0) a.counted += ivec4(0, 1, skipped ? 1 : 0, 0);
       if (!skipped && length > real(0)) add_region_depth(a, shade, r, f, direction, length);
       t = next;
       bool x = exits.x <= min(exits.y, exits.z);

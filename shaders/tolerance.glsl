@@ -287,7 +287,7 @@ real march_piece(INOUT(Accumulation) a, IN(Piece) p, IN(real) begin, IN(real) le
 // f at q; false where there is no value.
 bool take_value(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q, OUT(real) value) {
   value = fetch_field(r, inside_region(r, q));
-  if (AMRTEX_COUNT != 0) a.counted.x += 1;
+  count_samples(a, r, 1);
   return !(AMRTEX_VALIDITY != 0 && is_no_value(value));
 }
 
@@ -303,7 +303,7 @@ bool take_piece(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) q0, IN(vec3r) dq,
     ivec3 octant = stencil_octant(q0 + dq * (t + way * real(0.5)));
     Stencil s;
     fetch_stencil(r, octant, s);
-    if (AMRTEX_COUNT != 0) a.counted.x += 1;
+    count_samples(a, r, 1);
     for (int i = 0; i < 4; ++i) f[i] = stencil_value(s, 0, octant, q0 + dq * (t + way * (real(i) / real(3))));
     p = cubic_through(f, false);
     return true;

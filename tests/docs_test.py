@@ -90,6 +90,19 @@ class Figures(unittest.TestCase):
                     self.assertEqual(shapes(pathlib.Path(folder) / f"{name}.svg"), shapes(ROOT / f"docs/images/{name}.svg"),
                                      "draw it again: scripts/draw_figures.sh")
 
+    def test_a_figure_is_the_same_bytes_whenever_it_is_drawn(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for kind in ("svg", "pdf", "png"):
+                drawn = []
+                for name in ("first", "second"):
+                    file = pathlib.Path(folder) / f"{name}.{kind}"
+                    ended = subprocess.run([PROGRAM, "figure", str(ROOT / "docs/figures/sampling.json"), "-o", str(file)],
+                                           capture_output=True, text=True)
+                    self.assertEqual(ended.returncode, 0, ended.stderr)
+                    drawn.append(file.read_bytes())
+                with self.subTest(kind=kind):
+                    self.assertEqual(drawn[0], drawn[1])
+
     def test_an_unknown_figure_names_those_there_are(self):
         drawn = draw("structure")
         self.assertEqual(drawn.returncode, 2)
@@ -118,7 +131,7 @@ class Commands(unittest.TestCase):
         commands = commands_of(ROOT / "docs" / page)
         self.assertTrue(commands)
         with tempfile.TemporaryDirectory() as folder:
-            for name in ("data", "experiments"):
+            for name in ("data", "docs", "experiments"):
                 os.symlink(ROOT / name, pathlib.Path(folder) / name)
             os.mkdir(pathlib.Path(folder) / "out")
             for command in commands:
@@ -141,6 +154,11 @@ class Commands(unittest.TestCase):
         if not draws():
             self.skipTest("no GL context")
         self.run_all("color_maps.md")
+
+    def test_every_command_of_the_figures_works(self):
+        if not draws():
+            self.skipTest("no GL context")
+        self.run_all("figures.md")
 
 
 class Numbers(unittest.TestCase):

@@ -310,6 +310,15 @@ TEST(SettingsText, TablesOfTheDocumentationAreThoseOfTheRows) {
   EXPECT_TRUE(with_settings(text.str()) == text.str()) << "run `amrtex settings --write docs/experiments.md`";
 }
 
+TEST(SettingsText, TablesOfFiguresAreThoseOfTheRows) {
+  std::ifstream file(AMRTEX_SOURCE_DIR "/docs/figures.md");
+  std::ostringstream text;
+  text << file.rdbuf();
+  for (const char* section : {"figure", "panels", "overlays", "rays", "insets"})
+    EXPECT_THAT(text.str(), HasSubstr(fmt::format("<!-- settings:{} -->", section)));
+  EXPECT_TRUE(with_settings(text.str()) == text.str()) << "run `amrtex settings --write docs/figures.md`";
+}
+
 TEST(SettingsText, BuildParametersOfAllEncodingsStandInTheirTable) {
   const std::string table = settings_markdown("parameters");
   for (const Encoding* e : all_encodings())

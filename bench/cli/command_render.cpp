@@ -3,12 +3,13 @@
 
 #include <algorithm>
 #include <exception>
-#include <limits>
 
 #include "bench/cli/commands.hpp"
 #include "bench/cli/context_arguments.hpp"
 #include "bench/cli/render_arguments.hpp"
 #include "bench/measure/error_split.hpp"
+#include "bench/measure/heat_map.hpp"
+#include "bench/measure/picture_look.hpp"
 #include "bench/measure/scene_data.hpp"
 #include "bench/measure/value_resolution.hpp"
 #include "bench/settings/experiment.hpp"
@@ -29,7 +30,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Arguments : SceneArguments {
-  std::string input, output, memory_limit, save_scene;
+  std::string input, output, memory_limit, save_scene, heat;
   ContextArguments context;
   std::vector<std::string> set;
   bool reference = false;
@@ -45,44 +46,11 @@ struct Arguments : SceneArguments {
   std::optional<double> tolerance;
 };
 
-/// What the bar beside a picture shows.
-std::vector<PngColor> bar_colors(const Scene& scene, const ColorPoints& map) {
+/// What the bar beside a picture shows: the scene's colours, or the map of one number a pixel.
+std::vector<PngColor> bar_colors(const ColorPoints& points) {
   std::vector<PngColor> colors;
-  const auto add = [&](const ColorPoints& points) {
-    for (const auto& p : points) colors.push_back({p.value, {p.rgb.x, p.rgb.y, p.rgb.z}});
-  };
-  const RenderSettings& s = scene.settings;
-  if (s.picture_channels() == 1)
-    add(map);
-  else if (s.draws_volume() || (s.draws_surfaces() && s.isosurfaces.output == Output::color))
-    add(s.draws_volume() ? scene.transfer_function.color : surface_colors(scene).color);
+  for (const auto& p : points) colors.push_back({p.value, {p.rgb.x, p.rgb.y, p.rgb.z}});
   return colors;
-}
-
-/// With the unit where the file says it.
-std::string named_with_unit(const AmrHierarchy& mesh, int field) {
-  const std::string& unit = mesh.unit(field);
-  return mesh.fields()[static_cast<std::size_t>(field)] + (unit.empty() ? "" : " [" + unit + "]");
-}
-
-std::string bar_title(const Scene& scene, const AmrHierarchy& mesh) {
-  const Isosurfaces& iso = scene.settings.isosurfaces;
-  if (scene.settings.draws_surfaces() && iso.output == Output::depth) return "distance";
-  if (scene.settings.mode == Mode::iso && !iso.color_field.empty())
-    return named_with_unit(mesh, mesh.field_index(iso.color_field));
-  return named_with_unit(mesh, 0) + (scene.settings.mode == Mode::projection ? " x length" : "");
-}
-
-/// Raw values of rays that pass the domain are none, rather than 0: what lies around it is background.
-Picture without_outside(const Picture& picture, const Scene& scene, const AmrHierarchy& mesh) {
-  if (picture.channels != 1 || scene.settings.mirror) return picture;
-  Picture inside = picture;
-  const CameraFrame camera = camera_frame(scene.view, picture.width, picture.height);
-  for (int y = 0; y < picture.height; ++y)
-    for (int x = 0; x < picture.width; ++x)
-      if (!meets_box(camera_ray(camera, x, y, picture.width, picture.height), mesh.domain_lower(), mesh.domain_upper()))
-        *inside.pixel(x, y) = std::numeric_limits<double>::quiet_NaN();
-  return inside;
 }
 
 void write_picture(const Arguments& a, const Picture& picture, const Scene& scene, const AmrHierarchy& mesh) {
@@ -96,14 +64,30 @@ void write_picture(const Arguments& a, const Picture& picture, const Scene& scen
   options.color_bar = a.color_bar;
   options.logarithmic =
       scene.settings.picture_channels() == 1 && scene.settings.draws_surfaces() ? false : scene.transfer_function.logarithmic;
-  options.title = printable(bar_title(scene, mesh));
+  options.title = printable(shown_quantity(scene, mesh));
   const bool named = std::find(color_map_names().begin(), color_map_names().end(), a.color_map) != color_map_names().end();
-  options.colors = bar_colors(scene, color_map(named ? std::string_view(a.color_map) : "viridis"));
+  options.colors = bar_colors(picture.channels == 1 ? color_map(named ? std::string_view(a.color_map) : "viridis")
+                                                    : shown_colors(scene).color);
   if (a.outline)
     for (const auto& [x0, y0, x1, y1] :
          box_edges(mesh.domain_lower(), mesh.domain_upper(), scene.view, picture.width, picture.height))
       options.lines.push_back({x0, y0, x1, y1});
   write_png(without_outside(picture, scene, mesh), path, options);
+}
+
+/// What drawing took, or how far off the picture is, pixel by pixel.
+void write_heat(const Arguments& a, Heat heat, const Picture& picture, const AmrHierarchy& mesh) {
+  const fs::path path = a.output;
+  if (path.extension() == ".npy") return write_npy(picture, path, false);
+  if (path.extension() == ".exr") return write_exr(picture, path);
+  PngOptions options;
+  options.background = {1, 1, 1};
+  options.color_bar = !a.no_color_bar;
+  options.title = heat_name(heat);
+  options.colors = bar_colors(color_map(heat == Heat::error ? "cool_warm" : "viridis"));
+  if (heat == Heat::level) options.range = {0.0, static_cast<double>(std::max(1, mesh.finest_level()))};
+  if (heat == Heat::error) options.range = around_zero(picture);
+  write_png(picture, path, options);
 }
 
 /// An error asked for replaces the scene's step.
@@ -180,6 +164,10 @@ void explain_error(const Arguments& a, const SplitRequest& request) {
 void check_arguments(const Arguments& a) {
   if (a.output.empty() && !a.explain_error && a.save_scene.empty())
     throw UsageError("-o is missing: the picture to write, .png, .exr or .npy");
+  if (!a.heat.empty()) parse_heat(a.heat);
+  for (const auto& [given, name] :
+       {std::pair{a.reference, "--reference"}, {a.explain_error, "--explain-error"}, {a.transparent, "--transparent"}})
+    if (!a.heat.empty() && given) throw UsageError(fmt::format("--heat: a picture of its own; leave out {}", name));
   if (a.reference && a.explain_error) throw UsageError("--explain-error: the reference has no error; leave out --reference");
   if (a.json && !a.explain_error) throw UsageError("--json: only with --explain-error, whose table it replaces");
   const std::string extension = fs::path(a.output).extension();
@@ -259,8 +247,17 @@ void draw(const Arguments& a, const Drawn& d, const Scene& drawn, Context& conte
   }
   const Structure structure(context, std::move(field), request);
   const auto consumer = make_consumer(context, d.mesh, structure, drawn);
+  const Heat heat = a.heat.empty() ? Heat::error : parse_heat(a.heat);
+  if (heat != Heat::error) {
+    const RenderSettings& s = drawn.settings;
+    return write_heat(a, heat, counted_picture(heat, consumer->count_pixels(), s.width, s.height), d.mesh);
+  }
   consumer->draw();
   const Picture picture = consumer->read();
+  if (!a.heat.empty()) {
+    const HierarchyReference reference(d.mesh, 0, structure.field.definition);
+    return write_heat(a, heat, error_picture(picture, reference.render(drawn, reference_rule(a, d.scene))), d.mesh);
+  }
   if (!a.output.empty()) write_picture(a, picture, drawn, d.mesh);
   if (a.explain_error) {
     const ReferenceRule rule = reference_rule(a, d.scene);
@@ -338,6 +335,9 @@ void add_render_command(CLI::App& app, Command& chosen) {
                 "picture: .png to look at, .exr or .npy for the floats; may be left out with --explain-error or --save-scene");
   add_scene_arguments(*c, *a);
   c->add_option("--save-scene", a->save_scene, "scene file to write of what is drawn: `render` and `run` take it");
+  c->add_option(
+      "--heat", a->heat,
+      fmt::format("{}: in place of the picture, what each pixel took, or picture - reference", fmt::join(heat_names(), ", ")));
   c->add_flag("--transparent", a->transparent, "the picture's own opacity in place of a background (.png)");
   CLI::Option* bar =
       c->add_flag("--color-bar", a->color_bar, "a bar with the colours' values; beside pictures of data sets anyway");

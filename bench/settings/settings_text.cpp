@@ -5,7 +5,9 @@
 
 #include <algorithm>
 
+#include "bench/settings/figure_settings.hpp"
 #include "bench/settings/settings_table.hpp"
+#include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
 namespace {
@@ -164,6 +166,17 @@ Json key_json(const Section& section, const Key& key) {
   return json;
 }
 
+/// Of an experiment's file, or a figure's.
+const Section& documented_section(std::string_view name) {
+  std::vector<std::string> names = {std::string(kParameters)};
+  for (const std::span<const Section> sections : {all_sections(), figure_sections()})
+    for (const Section& section : sections) {
+      if (section.name == name) return section;
+      names.push_back(section.name);
+    }
+  throw UsageError(fmt::format("no section {}; accepted: {}", quote(name), fmt::join(names, ", ")));
+}
+
 }  // namespace
 
 Json settings_json() {
@@ -188,7 +201,7 @@ std::string settings_text() {
 std::string settings_markdown(std::string_view section) {
   if (section == kParameters) return parameters_markdown();
   std::string text = "| key | default | accepted | meaning |\n|---|---|---|---|\n";
-  for (const Key* key : section_of(section).keys) text += row(*key);
+  for (const Key* key : documented_section(section).keys) text += row(*key);
   return text;
 }
 

@@ -310,6 +310,10 @@ Picture BoxConsumer::read() const {
   return in_picture_units(std::move(picture), units);
 }
 
+std::vector<PixelWork> BoxConsumer::count_pixels() {
+  refuse(scene_.settings, "work is counted by pixels where one ray draws each; accepted: raycast");
+}
+
 WorkCounts BoxConsumer::count() {
   Program counting = make_program(true);
   const DrawTarget target = make_target(*context_, scene_.settings, true);

@@ -30,6 +30,7 @@ class BoxConsumer final : public Consumer {
   double gpu_ms_a_draw(int draws) override;
   Picture read() const override;
   WorkCounts count() override;
+  std::vector<PixelWork> count_pixels() override;
   const std::string& shader_hash() const override { return program_.hash(); }
   bool transfer_exact() const override { return resources_.transfer_exact(); }
 

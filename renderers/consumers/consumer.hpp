@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "renderers/scene/picture.hpp"
 
@@ -15,6 +16,15 @@ struct WorkCounts {
   std::int64_t regions = 0;          ///< visits of rays; of slices, pixels on a slice
   std::int64_t regions_skipped = 0;  ///< of these; an invisible box is not drawn at all and not counted
   std::int64_t passes = 1;           ///< draws a frame, each blended over those before
+};
+
+/// The same of one pixel's ray.
+struct PixelWork {
+  bool met = false;  ///< the ray meets the drawn box of the domain
+  std::int64_t samples = 0;
+  std::int64_t regions = 0;
+  std::int64_t regions_skipped = 0;
+  int finest_level = -1;  ///< of a sample; -1 without any
 };
 
 struct FrameTime {
@@ -41,6 +51,8 @@ class Consumer {
   /// Draws so many times inside one GL_TIME_ELAPSED query, with nothing read back; milliseconds a draw. With several draws it is
   /// a throughput: the end of one may overlap the next. NaN without a timer.
   virtual double gpu_ms_a_draw(int draws) = 0;
+  /// count() by pixels, in the order of Picture. Throws UnsupportedError where the consumer draws no rays.
+  virtual std::vector<PixelWork> count_pixels() = 0;
 };
 
 }  // namespace amrtex

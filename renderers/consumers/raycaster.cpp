@@ -76,20 +76,27 @@ Picture Raycaster::read() const {
 }
 
 WorkCounts Raycaster::count() {
+  WorkCounts counts;
+  for (const PixelWork& p : count_pixels()) {
+    counts.samples += p.samples;
+    counts.regions += p.regions;
+    counts.regions_skipped += p.regions_skipped;
+    counts.rays += p.met ? 1 : 0;
+  }
+  return counts;
+}
+
+std::vector<PixelWork> Raycaster::count_pixels() {
   Program counting = make_program(true);
   const DrawTarget target(*context_, scene_.settings.width, scene_.settings.height, true);
   resources_.bind(counting, *gpu_);
   target.clear();
   start_rays(target, counting);
-  WorkCounts counts;
-  for (const glm::uvec4& c : target.read_counters()) {
-    counts.samples += c.x;
-    counts.regions += c.y;
-    counts.regions_skipped += c.z;
-    counts.rays += c.w;
-  }
+  std::vector<PixelWork> pixels;
+  for (const glm::uvec4& c : target.read_counters())  // c.w: 0 where the ray passes by, 1 without a sample, 2 + level
+    pixels.push_back({c.w > 0, c.x, c.y, c.z, c.w > 1 ? static_cast<int>(c.w) - 2 : -1});
   context_->check("counting samples");
-  return counts;
+  return pixels;
 }
 
 }  // namespace amrtex

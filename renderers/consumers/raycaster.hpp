@@ -19,6 +19,7 @@ class Raycaster final : public Consumer {
   /// The last picture drawn: 4 channels for dvr, else 1.
   Picture read() const override;
   WorkCounts count() override;
+  std::vector<PixelWork> count_pixels() override;
   const std::string& shader_hash() const override { return program_.hash(); }
   const Program& program() const { return program_; }
   bool transfer_exact() const override { return resources_.transfer_exact(); }

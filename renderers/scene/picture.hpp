@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -59,9 +60,9 @@ struct PngOptions {
   bool color_bar = false;                     ///< a bar with ticks beside the picture, where there is something to show in it
   bool logarithmic = false;                   ///< colours are joined over log10(value)
   std::string title;                          ///< above the bar
-  /// Four channels: what the bar shows, over values. One channel: a map over 0 to 1, which is laid over the picture's range;
-  /// empty: viridis.
+  /// Four channels: what the bar shows, over values. One channel: a map over 0 to 1, which is laid over `range`; empty: viridis.
   std::vector<PngColor> colors;
+  std::optional<std::array<double, 2>> range;  ///< of one channel; absent: the picture's
   std::vector<PngLine> lines;  ///< behind four-channel pictures with a background, a faint colour that it sets off
 };
 /// 8-bit sRGB to look at; one-channel pictures through a colour map over their range.

@@ -212,7 +212,7 @@ std::optional<std::array<double, 2>> range_of(const Picture& picture, bool logar
 
 Canvas draw_values(const Picture& picture, const PngOptions& options) {
   const Scale map = unit_scale(options);
-  const auto range = range_of(picture, options.logarithmic);
+  const auto range = options.range ? options.range : range_of(picture, options.logarithmic);
   std::vector<PngColor> over_range;
   if (range && (*range)[0] < (*range)[1])
     for (int i = 0; i <= 64; ++i) {
