@@ -369,6 +369,8 @@ def hierarchy(levels: Any, boxes: Any, values: Any, *, lower: Any = (0, 0, 0), u
     steps = int(level.max()) if 0 <= level.max() < 64 else 0
     ratio = _integers("ratios", ratios)
     ratio_list = [int(ratio)] * steps if ratio.ndim == 0 else [int(r) for r in ratio.ravel()]
+    if len(ratio_list) != steps:
+        raise Error(f"ratios: {len(ratio_list)} of them; accepted: one number, or {steps}, one a pair of the {steps + 1} levels")
     root = [0, 0, 0] if root_cells is None else [int(r) for r in _integers("root_cells", root_cells).ravel()] + [1] * (3 - axes)
     if len(root) != 3 or (root_cells is not None and min(root) < 1) or any(not 0 <= r < 2**31 for r in root + ratio_list):
         raise Error(f"root_cells {root_cells!r}, ratios {ratios!r}; accepted: {axes} numbers of cells from 1, and ratios from 2")
@@ -380,7 +382,7 @@ def _integers(what: str, given: Any) -> np.ndarray:
     array = np.asarray(given)
     if array.dtype.kind not in "iu" or (array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max):
         raise Error(f"{what}: {'nothing' if array.size == 0 else f'type {array.dtype}'}; accepted: integers")
-    return np.ascontiguousarray(array, dtype=np.int64)
+    return array.astype(np.int64, order="C")
 
 
 def _corner(what: str, given: Any, axes: int) -> List[float]:
@@ -391,7 +393,7 @@ def _corner(what: str, given: Any, axes: int) -> List[float]:
 
 
 def _patches(field: str, given: Any, boxes: np.ndarray) -> List[np.ndarray]:
-    arrays = list(given) if np.ndim(given) or isinstance(given, (list, tuple)) else []
+    arrays = list(given) if isinstance(given, (list, tuple)) or np.ndim(given) else []
     if len(arrays) != len(boxes):
         raise Error(f"values of {field!r}: {len(arrays)} arrays; accepted: {len(boxes)}, one a patch")
     result = []
