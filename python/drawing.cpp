@@ -48,7 +48,7 @@ Experiment scene_of_data(HeldMesh& held, const PictureRequest& request) {
   const std::string& field = request.arguments.field;
   const auto mesh = field.empty() ? held.with_fields({held.mesh().fields().front()}) : held.with_fields({field});
   const Json json = default_scene(*mesh, request.arguments.request(mesh->name(), *mesh));
-  return parse_scene(json.dump(1), "default_scene", {.set = request.set, .holds_data = true});
+  return parse_scene(json.dump(1), std::filesystem::path(held.source()) / "default_scene", {.set = request.set, .holds_data = true});
 }
 
 /// What the call says beside the scene.

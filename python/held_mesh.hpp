@@ -13,15 +13,19 @@ namespace amrtex {
 
 class HeldMesh {
  public:
-  explicit HeldMesh(AmrHierarchy mesh) : mesh_(std::make_shared<const AmrHierarchy>(std::move(mesh))) {}
+  /// `source`: its file or folder, for messages; empty where there is none.
+  HeldMesh(AmrHierarchy mesh, std::string source)
+      : mesh_(std::make_shared<const AmrHierarchy>(std::move(mesh))), source_(std::move(source)) {}
 
   const AmrHierarchy& mesh() const { return *mesh_; }
+  const std::string& source() const { return source_; }
   /// Of these fields alone, the first of them being the drawn one; the mesh itself where they are its first ones. The copy that
   /// was made last is kept. Throws UsageError naming the fields there are.
   std::shared_ptr<const AmrHierarchy> with_fields(const std::vector<std::string>& names);
 
  private:
   std::shared_ptr<const AmrHierarchy> mesh_;
+  std::string source_;
   std::mutex mutex_;
   std::vector<std::string> copied_;
   std::shared_ptr<const AmrHierarchy> copy_;

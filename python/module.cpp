@@ -118,7 +118,7 @@ std::shared_ptr<Mesh> hierarchy(const std::string& name, const std::vector<std::
   arrays.levels = std::move(levels);
   auto shared = std::make_shared<ArrayMesh>(std::move(arrays));
   return Session::instance().call<std::shared_ptr<Mesh>>(
-      [shared] { return std::make_shared<Mesh>(make_hierarchy(std::move(*shared))); });
+      [shared] { return std::make_shared<Mesh>(make_hierarchy(std::move(*shared)), std::string()); });
 }
 
 std::string levels_text(const Mesh& held) {
@@ -147,7 +147,7 @@ std::array<double, 3> numbers_of(const Vec3d& v) { return {v.x, v.y, v.z}; }
 
 std::shared_ptr<Mesh> open(const std::string& path, const std::vector<std::string>& fields) {
   return Session::instance().call<std::shared_ptr<Mesh>>(
-      [path, fields] { return std::make_shared<Mesh>(AmrHierarchy(read_mesh(path, fields))); });
+      [path, fields] { return std::make_shared<Mesh>(AmrHierarchy(read_mesh(path, fields)), path); });
 }
 
 void save(const std::shared_ptr<Mesh>& mesh, const std::string& path, const std::string& format) {
@@ -242,16 +242,40 @@ std::pair<std::string, std::vector<std::string>> records(const std::string& fold
   return {text_of(Json(lines.records)), lines.warnings};
 }
 
+/// Python's types of our errors; they live as long as the module.
+struct ErrorTypes {
+  PyObject *error, *usage, *unsupported, *budget;
+};
+
+PyObject* make_error(py::module_& m, const char* name, PyObject* base, const char* text) {
+  PyObject* const type = PyErr_NewExceptionWithDoc(fmt::format("amrtex.{}", name).c_str(), text, base, nullptr);
+  if (type == nullptr) throw py::error_already_set();
+  m.attr(name) = py::handle(type);
+  return type;
+}
+
+/// As the command line prints it: a text that is no UTF-8 would be lost.
+void tell(PyObject* type, const std::exception& error) { PyErr_SetString(type, printable(error.what()).c_str()); }
+
 void add_errors(py::module_& m) {
-  const auto add = [&](auto& error, const char* text) {
-    error.attr("__module__") = "amrtex";
-    error.attr("__doc__") = text;
-  };
-  auto& error = py::register_exception<Error>(m, "Error");
-  add(error, "Bad input, or a failure of the GL context. The text is that of the command line.");
-  add(py::register_exception<UsageError>(m, "UsageError", error), "A name, key or value that does not exist; the text says what is accepted.");
-  add(py::register_exception<UnsupportedError>(m, "UnsupportedError", error), "Something that this encoding or this context cannot do.");
-  add(py::register_exception<BudgetError>(m, "BudgetError", error), "More bytes than the memory limit allows, found before they were allocated.");
+  static ErrorTypes types;
+  types.error = make_error(m, "Error", PyExc_Exception, "Bad input, or a failure of the GL context. The text is that of the command line.");
+  types.usage = make_error(m, "UsageError", types.error, "A name, key or value that does not exist; the text says what is accepted.");
+  types.unsupported = make_error(m, "UnsupportedError", types.error, "Something that this encoding or this context cannot do.");
+  types.budget = make_error(m, "BudgetError", types.error, "More bytes than the memory limit allows, found before they were allocated.");
+  py::register_exception_translator([](std::exception_ptr thrown) {
+    try {
+      if (thrown) std::rethrow_exception(thrown);
+    } catch (const UsageError& e) {
+      tell(types.usage, e);
+    } catch (const UnsupportedError& e) {
+      tell(types.unsupported, e);
+    } catch (const BudgetError& e) {
+      tell(types.budget, e);
+    } catch (const Error& e) {
+      tell(types.error, e);
+    }
+  });
 }
 
 void add_requests(py::module_& m) {
