@@ -48,7 +48,8 @@ Experiment scene_of_data(HeldMesh& held, const PictureRequest& request) {
   const std::string& field = request.arguments.field;
   const auto mesh = field.empty() ? held.with_fields({held.mesh().fields().front()}) : held.with_fields({field});
   const Json json = default_scene(*mesh, request.arguments.request(mesh->name(), *mesh));
-  return parse_scene(json.dump(1), std::filesystem::path(held.source()) / "default_scene", {.set = request.set, .holds_data = true});
+  return parse_scene(json.dump(1), std::filesystem::path(held.source()) / "default_scene",
+                     {.set = request.set, .holds_data = true});
 }
 
 /// What the call says beside the scene.
@@ -80,9 +81,9 @@ DrawnPicture draw_built(const PlannedPicture& planned, const Structure& structur
 
 }  // namespace
 
-Context& Contexts::at(ContextKind kind) {
-  std::unique_ptr<Context>& context = made_[kind];
-  if (!context) context = make_context(kind);
+Context& Contexts::at(const std::string& name) {
+  std::unique_ptr<Context>& context = made_[name];
+  if (!context) context = make_context(parse_context_kind(name));
   return *context;
 }
 
@@ -110,8 +111,7 @@ DrawnPicture draw_picture(PlannedPicture planned, const PictureRequest& request,
     const ReferenceRule rule = reference_rule(planned.experiment, request.reference_step, request.reference_tolerance);
     return {reference.render(planned.scene, rule), scene_warnings(*planned.mesh, planned.scene)};
   }
-  const std::string& kind = request.context.empty() ? planned.experiment.context : request.context;
-  Context& context = contexts.at(parse_context_kind(kind));
+  Context& context = contexts.at(request.context.empty() ? planned.experiment.context : request.context);
   BuildPoint& build = planned.experiment.builds.front();
   DrawnPicture drawn;
   draw_by_first(build, planned.free_encoding, [&] {
@@ -124,7 +124,7 @@ DrawnPicture draw_picture(PlannedPicture planned, const PictureRequest& request,
 HeldStructure::HeldStructure(std::shared_ptr<HeldMesh> mesh, const StructureRequest& request, Contexts& contexts)
     : held_(std::move(mesh)),
       mesh_(held_->with_fields({request.field.empty() ? held_->mesh().fields().front() : request.field})),
-      context_(&contexts.at(parse_context_kind(request.context))) {
+      context_(&contexts.at(request.context)) {
   Json entry = request.parameters;
   entry["name"] = request.encoding;
   written_["encodings"] = Json::array({entry});

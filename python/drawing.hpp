@@ -18,11 +18,11 @@ namespace amrtex {
 /// GL contexts that were asked for, for the thread that uses them.
 class Contexts {
  public:
-  /// Throws as make_context().
-  Context& at(ContextKind kind);
+  /// By the name that `--context` takes. Throws as parse_context_kind() and make_context().
+  Context& at(const std::string& name);
 
  private:
-  std::map<ContextKind, std::unique_ptr<Context>> made_;
+  std::map<std::string, std::unique_ptr<Context>> made_;
 };
 
 /// What `amrtex render` is told, of a mesh that is there already.
@@ -59,7 +59,7 @@ DrawnPicture draw_picture(PlannedPicture planned, const PictureRequest& request,
 
 /// The structure that a caller asked for.
 struct StructureRequest {
-  std::string field;  ///< empty: the first
+  std::string field;                                 ///< empty: the first
   std::string encoding, filter, storage, filtering;  ///< empty: the default of experiments
   Json parameters = Json::object();
   std::string context = "egl";

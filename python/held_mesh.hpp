@@ -33,7 +33,7 @@ class HeldMesh {
 
 /// The domain and the patches as a caller's arrays have them.
 struct ArrayMesh {
-  MeshDescription frame;  ///< name, domain, ratios, fields; root_cells of 0: as far as the boxes of level 0 reach
+  MeshDescription frame;             ///< name, domain, ratios, fields; root_cells of 0: as far as the boxes of level 0 reach
   std::vector<std::int64_t> levels;  ///< of each patch
   std::vector<Patch> patches;        ///< their boxes and values
 };

@@ -50,7 +50,8 @@ Picture picture_of(const Points& array) {
     throw UsageError("picture: accepted: an array of shape (height, width, 4) or (height, width, 1), as render returns it");
   constexpr py::ssize_t kMost = 1 << 16;
   if (array.shape(0) > kMost || array.shape(1) > kMost)
-    throw UsageError(fmt::format("picture: {} x {} pixels; at most {} a side are accepted", array.shape(1), array.shape(0), kMost));
+    throw UsageError(
+        fmt::format("picture: {} x {} pixels; at most {} a side are accepted", array.shape(1), array.shape(0), kMost));
   Picture picture(static_cast<int>(array.shape(1)), static_cast<int>(array.shape(0)), static_cast<int>(array.shape(2)));
   std::copy_n(array.data(), array.size(), picture.values.begin());
   return picture;
@@ -68,8 +69,7 @@ py::array column_of(const std::vector<double>& values) { return numbers(values, 
 
 int corner_of(std::int64_t value, std::size_t patch) {
   constexpr std::int64_t kMost = std::numeric_limits<std::int32_t>::max();
-  if (value < 0 || value > kMost)
-    throw Error(fmt::format("boxes[{}]: a corner is {}; accepted: 0 to {}", patch, value, kMost));
+  if (value < 0 || value > kMost) throw Error(fmt::format("boxes[{}]: a corner is {}; accepted: 0 to {}", patch, value, kMost));
   return static_cast<int>(value);
 }
 
@@ -102,7 +102,8 @@ std::shared_ptr<Mesh> hierarchy(const std::string& name, const std::vector<std::
                                 const Corners& boxes, const py::sequence& values, std::vector<int> ratios,
                                 std::array<double, 3> lower, std::array<double, 3> upper, std::array<int, 3> root_cells,
                                 std::array<bool, 3> periodic) {
-  if (boxes.ndim() != 3 || boxes.shape(0) != std::ssize(levels) || boxes.shape(1) != 2 || boxes.shape(2) < 2 || boxes.shape(2) > 3)
+  if (boxes.ndim() != 3 || boxes.shape(0) != std::ssize(levels) || boxes.shape(1) != 2 || boxes.shape(2) < 2 ||
+      boxes.shape(2) > 3)
     throw Error("boxes: accepted: an array of shape (patches, 2, 3), or (patches, 2, 2) for two-dimensional data");
   ArrayMesh arrays;
   MeshDescription& frame = arrays.frame;
@@ -158,13 +159,13 @@ void save(const std::shared_ptr<Mesh>& mesh, const std::string& path, const std:
 }
 
 /// What a GL context holds ends where it was made.
-std::shared_ptr<HeldStructure> encode(const std::shared_ptr<Mesh>& mesh, StructureRequest request, const std::string& parameters) {
+std::shared_ptr<HeldStructure> encode(const std::shared_ptr<Mesh>& mesh, StructureRequest request,
+                                      const std::string& parameters) {
   request.parameters = Json::parse(parameters);
   return Session::instance().call<std::shared_ptr<HeldStructure>>([mesh, request] {
     auto made = std::make_unique<HeldStructure>(mesh, request, Session::instance().contexts());
-    return std::shared_ptr<HeldStructure>(made.release(), [](HeldStructure* structure) {
-      Session::instance().end([structure] { delete structure; });
-    });
+    return std::shared_ptr<HeldStructure>(
+        made.release(), [](HeldStructure* structure) { Session::instance().end([structure] { delete structure; }); });
   });
 }
 
@@ -259,10 +260,13 @@ void tell(PyObject* type, const std::exception& error) { PyErr_SetString(type, p
 
 void add_errors(py::module_& m) {
   static ErrorTypes types;
-  types.error = make_error(m, "Error", PyExc_Exception, "Bad input, or a failure of the GL context. The text is that of the command line.");
-  types.usage = make_error(m, "UsageError", types.error, "A name, key or value that does not exist; the text says what is accepted.");
+  types.error =
+      make_error(m, "Error", PyExc_Exception, "Bad input, or a failure of the GL context. The text is that of the command line.");
+  types.usage =
+      make_error(m, "UsageError", types.error, "A name, key or value that does not exist; the text says what is accepted.");
   types.unsupported = make_error(m, "UnsupportedError", types.error, "Something that this encoding or this context cannot do.");
-  types.budget = make_error(m, "BudgetError", types.error, "More bytes than the memory limit allows, found before they were allocated.");
+  types.budget =
+      make_error(m, "BudgetError", types.error, "More bytes than the memory limit allows, found before they were allocated.");
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);

@@ -18,7 +18,7 @@ struct RunRequest : RunArguments {
   std::string program;  ///< amrtex, which measures
   std::string where;
   std::vector<std::string> only;
-  std::optional<std::int64_t> process_limit;  ///< bytes
+  std::optional<std::int64_t> process_limit;   ///< bytes
   std::optional<double> time_limit, time_out;  ///< seconds
   int repeat = 1;
   bool force = false, keep_old = false, retry_failed = false;

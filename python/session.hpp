@@ -15,8 +15,8 @@ class Session {
   /// The one of this process. It never ends: other threads may still draw when Python does.
   static Session& instance();
 
-  /// Does the work on the thread that draws, without the interpreter's lock. Ctrl-C ends the waiting: the work goes on to its end, nobody
-  /// takes what it makes, and the next work waits for it. `work` must own what it uses.
+  /// Does the work on the thread that draws, without the interpreter's lock. Ctrl-C ends the waiting: the work goes on to its
+  /// end, nobody takes what it makes, and the next work waits for it. `work` must own what it uses.
   template <class T>
   T call(std::function<T()> work) {
     auto result = std::make_shared<std::optional<T>>();

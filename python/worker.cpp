@@ -79,7 +79,8 @@ void Worker::add(std::shared_ptr<Task> task) {
 
 std::shared_ptr<Task> Worker::start(std::function<void()> work) {
   if (::getpid() != process_)
-    throw Error("amrtex was imported before this process was forked off; accepted: multiprocessing with the start method 'spawn'");
+    throw Error(
+        "amrtex was imported before this process was forked off; accepted: multiprocessing with the start method 'spawn'");
   auto task = std::make_shared<Task>(std::move(work));
   add(task);
   return task;

@@ -22,8 +22,7 @@ Scene with_tolerance(Scene scene, const std::optional<double>& tolerance) {
 }
 
 ReferenceRule reference_rule(const Experiment& scene, const std::optional<double>& step, const std::optional<double>& tolerance) {
-  if (step && tolerance)
-    throw UsageError("--reference-step stands in place of --reference-tolerance; accepted: one of both");
+  if (step && tolerance) throw UsageError("--reference-step stands in place of --reference-tolerance; accepted: one of both");
   ReferenceSettings settings = scene.reference.value_or(ReferenceSettings{});
   if (tolerance) settings.step.reset();
   const auto set = [&](const char* key, const char* option, const std::optional<double>& value) {

@@ -20,8 +20,8 @@ inline constexpr const char* kFirstChoice = "kd_tree";
 /// Makes `build` the next choice after this many have failed; false behind the last. All of them filter linearly.
 bool choose_encoding(BuildPoint& build, std::size_t failed);
 
-/// Calls draw(); where nobody said which encoding (`free`) and this one cannot hold the data, with the others in `build` until one
-/// draws. Throws what the first one threw.
+/// Calls draw(); where nobody said which encoding (`free`) and this one cannot hold the data, with the others in `build` until
+/// one draws. Throws what the first one threw.
 template <class F>
 void draw_by_first(BuildPoint& build, bool free, F&& draw) {
   std::exception_ptr first;

@@ -208,8 +208,9 @@ Experiment settled(const Experiment& experiment, const RunOptions& options) {
 Json to_json(const RunSummary& s) {
   Json shares = Json::object();
   for (std::size_t i = 0; i < kShareNames.size(); ++i) shares[std::string(kShareNames[i])] = s.shares.seconds[i];
-  return {{"measured", s.measured}, {"kept", s.kept}, {"unsupported", s.unsupported}, {"over_budget", s.over_budget}, {"failed", s.failed},
-          {"left", s.left},         {"seconds", s.seconds}, {"shares", shares},       {"warnings", s.warnings}};
+  return {{"measured", s.measured},       {"kept", s.kept},     {"unsupported", s.unsupported},
+          {"over_budget", s.over_budget}, {"failed", s.failed}, {"left", s.left},
+          {"seconds", s.seconds},         {"shares", shares},   {"warnings", s.warnings}};
 }
 
 RunSummary run_experiment(const Experiment& experiment, const RunOptions& options) {

@@ -1,5 +1,7 @@
 #include "renderers/consumers/probe.hpp"
 
+#include <cmath>
+
 #include "renderers/bindings/scene_bindings.hpp"
 
 namespace amrtex {
