@@ -13,7 +13,7 @@ packages=(g++ cmake ninja-build pkg-config python3 python3-glad
           pybind11-dev python3-dev python3-numpy python3-pytest python3-matplotlib)
 # a browser, LaTeX, a second reader of what we write, engines of clusters, a bare root of another distribution
 optional=(chromium texlive-latex-recommended texlive-latex-extra python3-h5py python3-yt paraview python3-paraview
-          snakemake slurm-wlm python3-pandas mypy mmdebstrap)
+          snakemake slurm-wlm python3-pandas mmdebstrap)
 case ${1:-} in
   '') ;;
   --full) packages+=("${optional[@]}") ;;
