@@ -20,7 +20,7 @@ install(DIRECTORY experiments DESTINATION ${AMRTEX_SHARE}
   PATTERN "*.npz" EXCLUDE)
 
 file(GLOB_RECURSE readmes RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS
-  bench/README.md renderers/README.md shaders/README.md structures/README.md tests/README.md)
+  bench/README.md python/README.md renderers/README.md shaders/README.md structures/README.md tests/README.md)
 foreach(readme IN LISTS readmes)
   cmake_path(GET readme PARENT_PATH folder)
   install(FILES ${readme} DESTINATION ${AMRTEX_SHARE}/${folder})

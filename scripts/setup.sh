@@ -9,10 +9,11 @@ set -euo pipefail
 packages=(g++ cmake ninja-build pkg-config python3 python3-glad
           libegl-dev libgl-dev libglm-dev libtbb-dev nlohmann-json3-dev libfmt-dev libspdlog-dev
           libtinyobjloader-dev libcli11-dev libpng-dev libopenexr-dev libcairo2-dev libfreetype-dev fonts-dejavu-core libpugixml-dev zlib1g-dev libzip-dev libhdf5-dev libxxhash-dev libgtest-dev
-          libgmock-dev libbenchmark-dev librapidcheck-dev patchelf)
+          libgmock-dev libbenchmark-dev librapidcheck-dev patchelf
+          pybind11-dev python3-dev python3-numpy python3-pytest python3-matplotlib)
 # a browser, LaTeX, a second reader of what we write, engines of clusters, a bare root of another distribution
 optional=(chromium texlive-latex-recommended texlive-latex-extra python3-h5py python3-yt paraview python3-paraview
-          snakemake slurm-wlm mmdebstrap)
+          snakemake slurm-wlm python3-pandas mmdebstrap)
 case ${1:-} in
   '') ;;
   --full) packages+=("${optional[@]}") ;;

@@ -110,7 +110,7 @@ std::vector<Include> includes_of(const fs::path& path) {
 
 std::vector<fs::path> source_files() {
   std::vector<fs::path> files;
-  for (const char* folder : {"structures", "renderers", "shaders", "bench", "tests"})
+  for (const char* folder : {"structures", "renderers", "shaders", "bench", "python", "tests"})
     for (const auto& entry : fs::recursive_directory_iterator(kRoot / folder))
       for (const char* extension : {".cpp", ".hpp", ".in"})
         if (entry.path().extension() == extension) files.push_back(entry.path());

@@ -2,7 +2,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <exception>
 
 #include "bench/cli/commands.hpp"
 #include "bench/cli/context_arguments.hpp"
@@ -10,17 +9,16 @@
 #include "bench/measure/error_split.hpp"
 #include "bench/measure/heat_map.hpp"
 #include "bench/measure/picture_look.hpp"
+#include "bench/measure/picture_options.hpp"
 #include "bench/measure/scene_data.hpp"
 #include "bench/measure/value_resolution.hpp"
 #include "bench/settings/experiment.hpp"
-#include "bench/settings/settings_table.hpp"
 #include "renderers/bindings/scene_needs.hpp"
 #include "renderers/consumers/make_consumer.hpp"
 #include "renderers/reference/hierarchy_reference.hpp"
 #include "renderers/scene/background.hpp"
 #include "renderers/scene/color_map.hpp"
 #include "renderers/scene/framing.hpp"
-#include "renderers/scene/scene_settings.hpp"
 #include "structures/mesh/quoted.hpp"
 #include "structures/mesh/whole_file.hpp"
 
@@ -88,37 +86,6 @@ void write_heat(const Arguments& a, Heat heat, const Picture& picture, const Amr
   if (heat == Heat::level) options.range = {0.0, static_cast<double>(std::max(1, mesh.finest_level()))};
   if (heat == Heat::error) options.range = around_zero(picture);
   write_png(picture, path, options);
-}
-
-/// An error asked for replaces the scene's step.
-Scene with_tolerance(Scene scene, const std::optional<double>& tolerance) {
-  if (!tolerance) return scene;
-  scene.settings.integrator = Integrator::tolerance;
-  scene.settings.tolerance = *tolerance;
-  try {
-    for (const char* key : {"tolerance", "integrator"}) validate_setting(scene, key);
-  } catch (const UsageError& e) {
-    throw UsageError(fmt::format("--tolerance: {}", e.what()));
-  }
-  return scene;
-}
-
-/// Of the command line, else of the scene.
-ReferenceRule reference_rule(const Arguments& a, const Experiment& scene) {
-  if (a.reference_step && a.reference_tolerance)
-    throw UsageError("--reference-step stands in place of --reference-tolerance; accepted: one of both");
-  ReferenceSettings settings = scene.reference.value_or(ReferenceSettings{});
-  if (a.reference_tolerance) settings.step.reset();
-  const auto set = [&](const char* key, const char* option, const std::optional<double>& value) {
-    if (!value) return;
-    const Setting<ReferenceSettings>& row = *reference_settings().find(key);
-    if (const auto problem = value_problem(*value, row.key.type))
-      throw UsageError(fmt::format("{} {}: {}", option, *value, problem->text));
-    row.set(settings, *value);
-  };
-  set("step", "--reference-step", a.reference_step);
-  set("tolerance", "--reference-tolerance", a.reference_tolerance);
-  return settings.rule();
 }
 
 /// Sum of the causes' squared rmse: what shares are of.
@@ -242,7 +209,7 @@ void draw(const Arguments& a, const Drawn& d, const Scene& drawn, Context& conte
   EncodedField field = encoding.build(d.mesh, request);
   for (const std::string& warning : value_resolution(field, drawn).warnings()) fmt::print(stderr, "warning: {}\n", warning);
   if (a.reference) {
-    write_picture(a, HierarchyReference(d.mesh, 0, field.definition).render(drawn, reference_rule(a, d.scene)), drawn, d.mesh);
+    write_picture(a, HierarchyReference(d.mesh, 0, field.definition).render(drawn, reference_rule(d.scene, a.reference_step, a.reference_tolerance)), drawn, d.mesh);
     return;
   }
   const Structure structure(context, std::move(field), request);
@@ -256,42 +223,15 @@ void draw(const Arguments& a, const Drawn& d, const Scene& drawn, Context& conte
   const Picture picture = consumer->read();
   if (!a.heat.empty()) {
     const HierarchyReference reference(d.mesh, 0, structure.field.definition);
-    return write_heat(a, heat, error_picture(picture, reference.render(drawn, reference_rule(a, d.scene))), d.mesh);
+    return write_heat(a, heat, error_picture(picture, reference.render(drawn, reference_rule(d.scene, a.reference_step, a.reference_tolerance))), d.mesh);
   }
   if (!a.output.empty()) write_picture(a, picture, drawn, d.mesh);
   if (a.explain_error) {
-    const ReferenceRule rule = reference_rule(a, d.scene);
+    const ReferenceRule rule = reference_rule(d.scene, a.reference_step, a.reference_tolerance);
     const Picture reference = HierarchyReference(d.mesh, 0, structure.field.definition).render(drawn, rule);
     const auto truth = analytic_field(d.scene.datasets[build.dataset]);
     explain_error(a, {d.mesh, encoding, structure, context, drawn, reference, picture, rule, truth.get()});
   }
-}
-
-/// What a data set is drawn by where nobody says: the first that holds it. All of them filter linearly.
-struct Choice {
-  const char* encoding;
-  Filter filter;
-};
-constexpr Choice kChoices[] = {{"kd_tree", Filter::linear_vertex}, {"exabricks", Filter::basis}, {"octree", Filter::linear_lod}};
-
-void draw_by_first(const Arguments& a, Drawn& d, const Scene& drawn, Context& context) {
-  std::exception_ptr first;
-  for (const Choice& choice : kChoices) {
-    BuildPoint& build = d.scene.builds.front();
-    if (first) {
-      build.encoding = choice.encoding;
-      build.filter = choice.filter;
-      build.parameters = Json::object();
-    }
-    try {
-      return draw(a, d, drawn, context);
-    } catch (const UnsupportedError&) {
-      if (!first) first = std::current_exception();
-    } catch (const BudgetError&) {
-      if (!first) first = std::current_exception();
-    }
-  }
-  std::rethrow_exception(first);
 }
 
 void save_scene(const Arguments& a, const Drawn& d) {
@@ -301,7 +241,7 @@ void save_scene(const Arguments& a, const Drawn& d) {
 
 /// What `--set` and options leave open, the program may choose.
 bool free_encoding(const Arguments& a, const Drawn& d) {
-  return a.encoding.empty() && a.filter.empty() && d.scene.builds.front().encoding == kChoices[0].encoding;
+  return a.encoding.empty() && a.filter.empty() && d.scene.builds.front().encoding == kFirstChoice;
 }
 
 int run(Arguments a) {
@@ -315,10 +255,7 @@ int run(Arguments a) {
     drawn.settings.prune = drawn.settings.prune || a.prune;
     const auto context = make_context(a.context.choice(d.scene.context));
     for (const std::string& warning : scene_warnings(d.mesh, drawn)) fmt::print(stderr, "warning: {}\n", printable(warning));
-    if (data && free_encoding(a, d))
-      draw_by_first(a, d, drawn, *context);
-    else
-      draw(a, d, drawn, *context);
+    draw_by_first(d.scene.builds.front(), data && free_encoding(a, d), [&] { draw(a, d, drawn, *context); });
   }
   save_scene(a, d);
   return 0;

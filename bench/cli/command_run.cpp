@@ -170,12 +170,7 @@ std::string shares_text(const RunSummary& s) {
 
 void print_summary(const Arguments& a, const RunSummary& s, const std::vector<Table>& tables) {
   if (a.json) {
-    Json shares = Json::object();
-    for (std::size_t i = 0; i < kShareNames.size(); ++i) shares[std::string(kShareNames[i])] = s.shares.seconds[i];
-    const Json json{{"measured", s.measured},       {"kept", s.kept},     {"unsupported", s.unsupported},
-                    {"over_budget", s.over_budget}, {"failed", s.failed}, {"left", s.left},
-                    {"seconds", s.seconds},         {"shares", shares},   {"warnings", s.warnings}};
-    fmt::print("{}\n", json.dump());
+    fmt::print("{}\n", to_json(s).dump());
     return;
   }
   for (const Table& t : tables) fmt::print("{}\n", to_markdown(t));
@@ -189,7 +184,7 @@ void print_summary(const Arguments& a, const RunSummary& s, const std::vector<Ta
 RunSummary measure(const Arguments& a, const Experiment& experiment, RunOptions options) {
   InterruptWatch watch(fmt::format("the same command goes on in {}", a.output));
   RunProgress progress(isatty(STDERR_FILENO) != 0);
-  options.measuring_process = a.measuring_process();
+  options.measuring_process = a.measuring_process(fs::read_symlink("/proc/self/exe").string());
   options.measuring = [&](pid_t process) { watch.watch(process); };
   options.planned = [&](int points) { progress.plan(points); };
   options.progress = [&](const std::string& text) { progress.now(text); };
@@ -237,24 +232,6 @@ int report(const Arguments& a) {
 }
 
 }  // namespace
-
-std::int64_t parse_bytes(const std::string& text) {
-  std::size_t used = 0;
-  double number = -1;
-  try {
-    number = std::stod(text, &used);
-  } catch (const std::exception&) {
-  }
-  const std::string unit = text.substr(std::min(used, text.size()));
-  double factor = 0;
-  if (unit.empty() || unit == "B") factor = 1;
-  if (unit == "KiB") factor = 1024;
-  if (unit == "MiB") factor = 1024.0 * 1024;
-  if (unit == "GiB") factor = 1024.0 * 1024 * 1024;
-  if (!(number >= 0) || factor == 0 || number * factor > 9e18)
-    throw UsageError(fmt::format("{} is no amount of memory; accepted: 500000, 64KiB, 512MiB, 2GiB", text));
-  return static_cast<std::int64_t>(number * factor);
-}
 
 void add_set_option(CLI::App& command, std::vector<std::string>& set) {
   command

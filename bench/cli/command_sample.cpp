@@ -70,11 +70,6 @@ struct Sampled {
   double off_gl = 0;            ///< of the largest coordinate of it, widths of the finest cells
 };
 
-/// What a context can be given of a position: a cell, and the fraction in float.
-FinestPosition as_floats(const FinestPosition& p) {
-  return {p.cell, Vec3d(glm::min(Vec3f(p.fraction), Vec3f(std::nextafter(1.0F, 0.0F))))};
-}
-
 void note_gl_point(const AmrHierarchy& mesh, const FinestPosition& exact, const FinestPosition& rounded, Sampled& sample) {
   sample.p_gl = mesh.domain_lower() + (Vec3d(rounded.cell) + rounded.fraction) * mesh.spacing(mesh.finest_level());
   const Vec3d off = glm::abs(rounded.fraction - exact.fraction);
@@ -105,7 +100,7 @@ std::vector<Sampled> sample(const Arguments& a) {
     samples.push_back({.p = p});
     const auto position = finest_position(mesh, p);
     if (!position) continue;
-    rounded.push_back(as_floats(*position));
+    rounded.push_back(position_on_gl(*position));
     note_gl_point(mesh, *position, rounded.back(), samples.back());
     samples.back().reference = reference.sample(*position);
     if (const auto leaf = mesh.find_leaf(position->cell)) samples.back().level = leaf->level;

@@ -3,11 +3,11 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
 
+#include "bench/settings/bytes_text.hpp"
 #include "structures/common/encoding.hpp"
 
 namespace amrtex {
@@ -34,8 +34,6 @@ void add_set_option(CLI::App& command, std::vector<std::string>& set);
 /// On stderr, a line each.
 void print_warnings(const std::vector<std::string>& warnings);
 
-/// "512MiB", "2GiB", "1000000". Throws UsageError.
-std::int64_t parse_bytes(const std::string& text);
 /// A JSON file, or the JSON itself. Throws UsageError naming the file, or `what` for JSON without one, and the line.
 Json read_json_argument(const std::string& text, const char* what);
 /// Build parameters from texts NAME=VALUE. Throws UsageError.

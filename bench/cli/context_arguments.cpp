@@ -16,10 +16,4 @@ ContextChoice ContextArguments::choice(const std::string& fallback) const {
   return {asked.kind, device};
 }
 
-void add_context_options(CLI::App& command, ContextArguments& arguments, const std::string& otherwise) {
-  command.add_option("--context", arguments.context, "egl, egl_device or osmesa; " + otherwise);
-  command.add_option("--device", arguments.device, "number of the device as `amrtex doctor` lists it, of --context egl_device")
-      ->check(CLI::NonNegativeNumber);
-}
-
 }  // namespace amrtex

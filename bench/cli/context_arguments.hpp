@@ -1,11 +1,14 @@
 // `--context` and `--device`, which every command that draws takes.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
 
 #include "renderers/context/context.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace amrtex {
 

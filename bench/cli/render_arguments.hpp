@@ -1,12 +1,15 @@
 // What `amrtex render` and `amrtex run` are told of a scene of a data set.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "bench/settings/default_scene.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace amrtex {
 

@@ -1,13 +1,16 @@
 // What `amrtex run` and the processes that it starts are given.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include "bench/cli/context_arguments.hpp"
 #include "bench/measure/run_options.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace amrtex {
 
@@ -22,8 +25,8 @@ struct RunArguments {
 
   Experiment experiment() const;
   RunOptions options() const;
-  /// The same as words of a command line that begins with this program and `measure`.
-  std::vector<std::string> measuring_process() const;
+  /// The same as words of a command line that begins with `program`, which is amrtex, and `measure`.
+  std::vector<std::string> measuring_process(const std::string& program) const;
 };
 
 void add_run_arguments(CLI::App& command, RunArguments& arguments);

@@ -205,6 +205,14 @@ Experiment settled(const Experiment& experiment, const RunOptions& options) {
 
 }  // namespace
 
+Json to_json(const RunSummary& s) {
+  Json shares = Json::object();
+  for (std::size_t i = 0; i < kShareNames.size(); ++i) shares[std::string(kShareNames[i])] = s.shares.seconds[i];
+  return {{"measured", s.measured},       {"kept", s.kept},     {"unsupported", s.unsupported},
+          {"over_budget", s.over_budget}, {"failed", s.failed}, {"left", s.left},
+          {"seconds", s.seconds},         {"shares", shares},   {"warnings", s.warnings}};
+}
+
 RunSummary run_experiment(const Experiment& experiment, const RunOptions& options) {
   const Experiment used = settled(experiment, options);
   if (options.measuring_process.empty()) {

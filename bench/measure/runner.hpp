@@ -23,6 +23,9 @@ struct RunSummary {
   double seconds = 0;  ///< from beginning to end
 };
 
+/// For programs: counts, seconds, warnings.
+Json to_json(const RunSummary& summary);
+
 /// Measures every point that has no record of this implementation yet. Points that fail or cannot be done
 /// become records too; throws only for what concerns the whole experiment: bad parameters, the output folder.
 RunSummary run_experiment(const Experiment& experiment, const RunOptions& options);

@@ -93,6 +93,8 @@ struct Experiment {
 struct ReadOptions {
   std::vector<std::string> set = {};      ///< "render.step=0.5": values that replace those of the file (docs/experiments.md)
   std::uint64_t most_points = 1'000'000;  ///< a file with more is refused before any of them is made
+  /// The caller has the mesh: `datasets` may be left out, and of what it says only `field` counts. The data set has no source then.
+  bool holds_data = false;
 };
 
 /// Throw UsageErrors that name file, line and key and what is accepted there, and Error

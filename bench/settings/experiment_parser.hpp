@@ -30,6 +30,8 @@ struct ExperimentParser {
 void require_few_points(const ExperimentParser& parser, std::uint64_t most);
 
 void parse_datasets(ExperimentParser& parser);
+/// Of a mesh that the caller has (ReadOptions::holds_data).
+void parse_held_dataset(ExperimentParser& parser);
 void parse_builds(ExperimentParser& parser);
 void parse_renders(ExperimentParser& parser);
 std::vector<RenderPoint> parse_views(ExperimentParser& parser);

@@ -68,6 +68,18 @@ void parse_datasets(ExperimentParser& parser) {
   }
 }
 
+void parse_held_dataset(ExperimentParser& parser) {
+  DatasetSource source;
+  if (const auto datasets = parser.root.find("datasets")) {
+    const std::vector<JsonNode> nodes = parser.axes.values(*datasets, 0);
+    if (nodes.size() > 1) datasets->fail("several data sets; accepted: none or one, for a mesh that is there already");
+    nodes.front().accept_keys(names_of(section_of("datasets").keys));
+    if (const auto field = nodes.front().find("field"); field && !field->json().is_null()) source.field = field->text();
+    if (const auto name = nodes.front().find("name")) source.name = name->text();
+  }
+  parser.experiment.datasets.push_back(std::move(source));
+}
+
 ExistingPath existing_path(const JsonNode& node, const JsonFile& file) {
   const std::filesystem::path given = node.text();
   const std::filesystem::path around = file.path().has_parent_path() ? file.path().parent_path() : std::filesystem::path(".");

@@ -28,7 +28,10 @@ Experiment parse(JsonFile file, bool scene, const ReadOptions& options) {
   parser.experiment.file = file.path();
   accept_root_keys(parser);
   require_few_points(parser, options.most_points);
-  parse_datasets(parser);
+  if (options.holds_data)
+    parse_held_dataset(parser);
+  else
+    parse_datasets(parser);
   parse_builds(parser);
   parse_renders(parser);
   parse_measuring(parser);

@@ -1,5 +1,7 @@
 #include "renderers/consumers/probe.hpp"
 
+#include <cmath>
+
 #include "renderers/bindings/scene_bindings.hpp"
 
 namespace amrtex {
@@ -13,6 +15,10 @@ GlBuffer upload(Context& context, const std::vector<T>& values) {
 }
 
 }  // namespace
+
+FinestPosition position_on_gl(const FinestPosition& p) {
+  return {p.cell, Vec3d(glm::min(Vec3f(p.fraction), Vec3f(std::nextafter(1.0F, 0.0F))))};
+}
 
 std::vector<ProbeResult> probe_on_gl(Context& context, const DomainGeometry& geometry, const Structure& structure,
                                      std::span<const FinestPosition> points, int number) {

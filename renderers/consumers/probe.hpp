@@ -11,6 +11,9 @@
 
 namespace amrtex {
 
+/// What a context can be given of a position: a cell, and the fraction in float.
+FinestPosition position_on_gl(const FinestPosition& p);
+
 /// The shader's positions: the fraction as float, so that GL and CPU see the same point. `number`
 /// of the fields that the structure holds; throw UsageError where there are not so many.
 std::vector<ProbeResult> probe_on_gl(Context& context, const DomainGeometry& geometry, const Structure& structure,
