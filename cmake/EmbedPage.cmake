@@ -3,9 +3,9 @@
 #   MODULES  the folder of npm packages, or empty: plots are pictures then
 #   VERSION  of amrtex
 set(text "// Made by cmake/EmbedPage.cmake.\n#include \"bench/report/page/page_assets.hpp\"\n\nnamespace amrtex {\nnamespace {\n\n")
-# adjacent literals of less than 64 KiB are the most portable; GCC and Clang take any
+# literals of more than 64 KiB: GCC and Clang take them
 function(embed name contents)
-  string(APPEND text "constexpr std::string_view ${name} = R\"page_text(${contents})page_text\";\n")
+  string(APPEND text "constexpr char ${name}[] = R\"page_text(${contents})page_text\";\n")
   set(text "${text}" PARENT_SCOPE)
 endfunction()
 macro(embed_file name file)
@@ -39,5 +39,7 @@ if(MODULES)
 endif()
 embed(kPlots "${plots}")
 embed(kLicences "${licences}")
-string(APPEND text "\n}  // namespace\n\nPageAssets page_assets() { return {kPage, kIndex, kStyle, kScripts, kPlots, kLicences, \"${VERSION}\"}; }\n\n}  // namespace amrtex\n")
+# the length is known: nothing has to be counted
+string(APPEND text "\ntemplate <std::size_t N>\nconstexpr std::string_view text(const char (&array)[N]) {\n  return {array, N - 1};\n}\n")
+string(APPEND text "\n}  // namespace\n\nPageAssets page_assets() { return {text(kPage), text(kIndex), text(kStyle), text(kScripts), text(kPlots), text(kLicences), \"${VERSION}\"}; }\n\n}  // namespace amrtex\n")
 file(WRITE ${OUTPUT} "${text}")

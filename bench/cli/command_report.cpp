@@ -60,9 +60,9 @@ int report_folder(const ReportArguments& a) {
     for (const Table& t : *list) fmt::print("{}\n", to_markdown(t));
   const std::size_t plots = write_plots(a.folder, records);
   const Prose prose = prose_of_results(a.folder);
-  const ReportPart part{a.folder, records, std::move(tables.asked), std::move(tables.scatter)};
-  const PageData page = page_data(
-      {part}, {title_of(a, records), prose.question, prose.conclusion, a.pictures, PageOptions{}.most_pixels, has_live_plots()});
+  const std::vector<ReportPart> parts = {{a.folder, records, std::move(tables.asked), std::move(tables.scatter)}};
+  const PageData page = page_data(parts, {title_of(a, records), prose.question, prose.conclusion, a.pictures,
+                                          PageOptions{}.most_pixels, has_live_plots()});
   print_warnings(page.warnings);
   if (a.keep_pictures)
     fmt::print("{}/pictures.npz: {} pictures\n", printable(a.folder), write_small_pictures(a.folder, page.pictured));
