@@ -14,9 +14,11 @@ packages=(g++ cmake ninja-build pkg-config python3 python3-glad
 # a browser, LaTeX, a second reader of what we write, engines of clusters, a bare root of another distribution
 optional=(chromium texlive-latex-recommended texlive-latex-extra python3-h5py python3-yt paraview python3-paraview
           snakemake slurm-wlm python3-pandas mmdebstrap)
+# plots of report pages; pictures of them where there is no npm
+modules=(vega@6.4.0 vega-lite@6.5.0 vega-embed@7.3.0)
 case ${1:-} in
   '') ;;
-  --full) packages+=("${optional[@]}") ;;
+  --full) packages+=("${optional[@]}"); command -v npm >/dev/null || packages+=(npm) ;;
   *) echo "scripts/setup.sh: no argument '$1'; accepted: --full" >&2; exit 2 ;;
 esac
 mesa=(libgl1-mesa-dri libegl-mesa0 libglx-mesa0 mesa-vulkan-drivers libvulkan1 libgbm1)
@@ -34,6 +36,27 @@ install_quietly() {
 
 . /etc/os-release
 log=$(mktemp)
+root=$(cd "$(dirname "$0")/.." && pwd)
+
+# Their bundles alone, of these very versions: what they depend on is inside of them.
+install_modules() {
+  local module name folder
+  command -v npm >/dev/null || { echo "setup: no npm here; the plots of report pages will be pictures" >&2; return 0; }
+  for module in "${modules[@]}"; do
+    name=${module%@*}
+    folder=$root/node_modules/$name
+    grep -qs "\"version\": \"${module#*@}\"" "$folder/package.json" && continue
+    rm -rf "$folder" "$folder.new"
+    mkdir -p "$folder.new"
+    if ! (cd "$folder.new" && npm pack --silent "$module" >package.name && tar -xzf "$(tail -n 1 package.name)" --strip-components=1) 2>"$log"; then
+      rm -rf "$folder.new"
+      echo "setup: the npm package $module cannot be had; the plots of report pages will be pictures: $(tail -n 1 "$log")" >&2
+      return 0
+    fi
+    rm -f "$folder.new"/*.tgz "$folder.new/package.name"
+    mv "$folder.new" "$folder"
+  done
+}
 trap 'rm -f "$log"' EXIT
 
 # The backports suite, derived from whichever source serves bookworm already.
@@ -60,6 +83,7 @@ if [ "${VERSION_CODENAME:-}" = bookworm ] && { [ -z "$(mesa_version)" ] || dpkg 
   backport_mesa=yes
 fi
 if [ ${#missing[@]} = 0 ] && [ $backport_mesa = no ] && { installed $osmesa || [ -e /var/lib/amrtex-no-osmesa ]; }; then
+  install_modules
   exit 0
 fi
 
@@ -74,3 +98,4 @@ if ! installed $osmesa; then
   if apt-cache show $osmesa >/dev/null 2>&1; then install_quietly $osmesa
   else echo "setup: this distribution has no $osmesa; OSMesa contexts will be reported as unavailable" >&2; run_as_root touch /var/lib/amrtex-no-osmesa; fi
 fi
+install_modules

@@ -81,7 +81,7 @@ TEST_F(ScatterTest, DrawsAPointAViewAndTheLine) {
   ASSERT_THAT(result.diagrams, SizeIs(2));
   EXPECT_EQ(result.diagrams[0].name, "scatter_few_exabricks");
   const Json s = result.diagrams[0].specification;
-  EXPECT_EQ(s["$schema"], "https://vega.github.io/schema/vega-lite/v5.json");
+  EXPECT_EQ(s["$schema"], "https://vega.github.io/schema/vega-lite/v6.json");
   ASSERT_THAT(s["hconcat"], SizeIs(2));
   const Json& line = s["hconcat"][0]["layer"][0]["data"]["values"];
   const Json& points = s["hconcat"][0]["layer"][1]["data"]["values"];

@@ -183,7 +183,7 @@ TEST_F(WorkPrecisionTest, KeepsWhatWasNotMeasuredInSight) {
 
 TEST_F(WorkPrecisionTest, DrawsPointsAndFrontOnLogarithmicAxes) {
   const Json s = made(four_settings()).diagrams[0].specification;
-  EXPECT_EQ(s["$schema"], "https://vega.github.io/schema/vega-lite/v5.json");
+  EXPECT_EQ(s["$schema"], "https://vega.github.io/schema/vega-lite/v6.json");
   const Json& plot = s["vconcat"][0];
   ASSERT_THAT(plot["layer"], SizeIs(2));
   for (const Json& layer : plot["layer"])

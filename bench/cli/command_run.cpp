@@ -18,7 +18,7 @@
 #include "bench/records/record_file.hpp"
 #include "bench/report/paper_tables.hpp"
 #include "bench/report/repetitions.hpp"
-#include "bench/report/report.hpp"
+#include "bench/report/report_files.hpp"
 #include "bench/report/scatter.hpp"
 #include "bench/report/verdict.hpp"
 #include "bench/report/work_precision.hpp"
@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 
 struct Arguments : RunArguments {
   SceneArguments scene;  ///< where the input is a data set
-  std::string columns, where, process_limit;
+  std::string where, process_limit;
   std::vector<std::string> only;
   std::optional<double> time_limit, time_out;
   int repeat = 1;
@@ -44,46 +44,11 @@ struct Arguments : RunArguments {
   bool json = false;
 };
 
-std::vector<Table> ordinary_tables(const fs::path& folder, fs::path columns, const std::vector<Json>& records) {
-  if (columns.empty() && fs::exists(folder / "columns.json")) columns = folder / "columns.json";
-  ReportOptions options;
-  if (!columns.empty())
-    for (const Json& r : records) options.columns[r.at("experiment")] = read_columns(columns);
-  return make_tables(records, options);
-}
-
-void write_tables(const fs::path& folder, const std::vector<Table>& tables) {
-  std::string markdown;
-  std::string csv;
-  std::string latex;
-  for (const Table& t : tables) {
-    markdown += to_markdown(t) + "\n";
-    csv += to_csv(t) + "\n";
-    latex += to_latex(t) + "\n";
-  }
-  write_atomically(folder / "table.md", markdown);
-  write_atomically(folder / "table.csv", csv);
-  write_atomically(folder / "table.tex", latex);
-}
-
-/// Writes the ordinary tables, then those beside a paper; so the first are there when tables.json ends in an error.
-std::vector<Table> write_report(const fs::path& folder, const std::string& columns, const std::vector<Json>& all) {
-  const std::vector<Json> records = one_a_point(all);
-  if (records.empty()) throw Error(fmt::format("{}: no records; accepted: a folder that `amrtex run` wrote", folder.string()));
-  std::vector<Table> tables = ordinary_tables(folder, columns, records);
-  write_tables(folder, tables);
-  const fs::path file = folder / "tables.json";
-  if (!fs::exists(file)) return tables;
-  for (Table& table : make_paper_tables(file, records)) tables.push_back(std::move(table));
-  const auto add = [&](const auto& made) {
-    tables.insert(tables.end(), made.tables.begin(), made.tables.end());
-    for (const Diagram& diagram : made.diagrams)
-      write_atomically(folder / (diagram.name + ".vl.json"), diagram.specification.dump(1) + "\n");
-  };
-  add(make_work_precision(file, records));
-  add(make_scatter(file, records));
-  write_tables(folder, tables);
-  return tables;
+std::vector<Table> report_tables(const fs::path& folder, const std::vector<Json>& records) {
+  FolderTables tables = write_tables(folder, "", one_a_point(records));
+  std::vector<Table> all = std::move(tables.ordinary);
+  all.insert(all.end(), tables.asked.begin(), tables.asked.end());
+  return all;
 }
 
 /// The experiment's own choice of tables goes along with its records.
@@ -178,7 +143,7 @@ void print_summary(const Arguments& a, const RunSummary& s, const std::vector<Ta
              s.over_budget, s.failed);
   if (s.left > 0) fmt::print("{} points left when the time was over; the same command goes on\n", s.left);
   fmt::print("time: {}\n", shares_text(s));
-  fmt::print("records, pictures and tables: {}\n", printable(a.output));
+  fmt::print("records, pictures and tables: {0}; `amrtex report {0}` makes a page of them\n", printable(a.output));
 }
 
 RunSummary measure(const Arguments& a, const Experiment& experiment, RunOptions options) {
@@ -217,18 +182,9 @@ int run(Arguments a) {
   for (const char* name : {"columns.json", "tables.json"}) copy_beside(experiment, a.output, name);
   const bool any = s.measured + s.kept + s.unsupported + s.over_budget + s.failed > 0;
   const std::vector<Json> records = any ? load_records(a.output) : std::vector<Json>();
-  print_summary(a, s, any ? write_report(a.output, "", records) : std::vector<Table>());
+  print_summary(a, s, any ? report_tables(a.output, records) : std::vector<Table>());
   if (data && !a.json) fmt::print("\n{}\n", verdict(one_a_point(records)));
   return s.failed > 0 ? 1 : 0;
-}
-
-int report(const Arguments& a) {
-  const RecordLines lines = load_record_lines(a.input);
-  print_warnings(lines.warnings);
-  const std::vector<Table> tables = write_report(a.input, a.columns, lines.records);
-  for (const Table& t : tables) fmt::print("{}\n", to_markdown(t));
-  fmt::print("{0}/table.md, {0}/table.csv, {0}/table.tex\n", a.input);
-  return 0;
 }
 
 }  // namespace
@@ -268,12 +224,6 @@ void add_run_commands(CLI::App& app, Command& chosen) {
       "Example: amrtex run experiments/quickstart/experiment.json --out out/quickstart\n"
       "         amrtex run data/amrex_tiny/plt00008 --out out/tiny");
   r->callback([a, &chosen] { chosen = [a] { return run(*a); }; });
-
-  CLI::App* p = app.add_subcommand("report", "tables (Markdown, CSV, LaTeX) from the records of a folder");
-  p->add_option("folder", a->input, "what `amrtex run` wrote")->required();
-  p->add_option("--columns", a->columns, "JSON list of column keys");
-  p->footer("Example: amrtex report out/quickstart");
-  p->callback([a, &chosen] { chosen = [a] { return report(*a); }; });
 }
 
 }  // namespace amrtex

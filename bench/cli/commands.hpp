@@ -22,7 +22,8 @@ void add_sample_command(CLI::App& app, Command& chosen);
 void add_structure_command(CLI::App& app, Command& chosen);
 void add_render_command(CLI::App& app, Command& chosen);
 void add_figure_commands(CLI::App& app, Command& chosen);  // figure, slice
-void add_run_commands(CLI::App& app, Command& chosen);  // run, report
+void add_run_commands(CLI::App& app, Command& chosen);
+void add_report_command(CLI::App& app, Command& chosen);
 void add_measure_command(CLI::App& app, Command& chosen);
 void add_compare_commands(CLI::App& app, Command& chosen);  // compare, merge
 void add_verify_command(CLI::App& app, Command& chosen);

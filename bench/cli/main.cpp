@@ -72,6 +72,7 @@ int main(int argc, char** argv) {
   amrtex::add_render_command(app, chosen);
   amrtex::add_figure_commands(app, chosen);
   amrtex::add_run_commands(app, chosen);
+  amrtex::add_report_command(app, chosen);
   amrtex::add_measure_command(app, chosen);
   amrtex::add_compare_commands(app, chosen);
   amrtex::add_verify_command(app, chosen);

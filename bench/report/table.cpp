@@ -52,6 +52,58 @@ std::string on_one_line(std::string_view text) {
   return line;
 }
 
+/// Of a letter in UTF-8, by its first byte.
+std::size_t letter_bytes(char first) {
+  const auto byte = static_cast<unsigned char>(first);
+  return byte < 0x80 ? 1 : byte < 0xE0 ? 2 : byte < 0xF0 ? 3 : 4;
+}
+
+/// What means something else to LaTeX, or nothing to its standard fonts.
+constexpr std::pair<std::string_view, std::string_view> kLatex[] = {
+    {"&", "\\&"},
+    {"%", "\\%"},
+    {"$", "\\$"},
+    {"#", "\\#"},
+    {"_", "\\_"},
+    {"{", "\\{"},
+    {"}", "\\}"},
+    {"~", "\\textasciitilde{}"},
+    {"^", "\\textasciicircum{}"},
+    {"\\", "\\textbackslash{}"},
+    {"<", "\\textless{}"},
+    {">", "\\textgreater{}"},
+    {"|", "\\textbar{}"},
+    {"\"", "''"},
+    {"[", "{[}"},
+    {"]", "{]}"},
+    {"*", "{*}"},  // the last three mean something behind a row's end
+    {"–", "--"},
+    {"—", "---"},
+    {"±", "$\\pm$"},
+    {"×", "$\\times$"},
+    {"·", "$\\cdot$"},
+    {"≤", "$\\leq$"},
+    {"≥", "$\\geq$"},
+    {"²", "$^2$"},
+    {"³", "$^3$"},
+    {"→", "$\\to$"},
+    {"−", "$-$"},
+    {"…", "\\dots{}"},
+    {"µ", "$\\mu$"},
+    {"°", "$^\\circ$"}};
+
+std::string latex_letter(std::string_view letter) {
+  for (const auto& [plain, latex] : kLatex)
+    if (letter == plain) return std::string(latex);
+  if (letter.size() == 1) return std::string(letter);
+  // accents of western Europe have their place in every font; others are named by their number
+  std::uint32_t code = static_cast<unsigned char>(letter[0]) & (0xFFU >> (letter.size() + 1));
+  for (const char c : letter.substr(1)) code = code << 6 | (static_cast<unsigned char>(c) & 0x3FU);
+  const bool western = code >= 0xC0 && code <= 0xFF && code != 0xD0 && code != 0xD7 && code != 0xDE && code != 0xF0 &&
+                       code != 0xF7 && code != 0xFE;
+  return western ? std::string(letter) : fmt::format("{{[}}U+{:04X}{{]}}", code);
+}
+
 std::string escape_csv(std::string_view text) {
   if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
   std::string quoted = "\"";
@@ -112,36 +164,13 @@ std::string exact_cell(const Cell& cell) {
 }
 
 std::string escape_latex(std::string_view text) {
+  const std::string line = printable(on_one_line(text));
   std::string escaped;
-  for (const char c : printable(on_one_line(text))) switch (c) {
-      case '&':
-      case '%':
-      case '$':
-      case '#':
-      case '_':
-      case '{':
-      case '}':
-        escaped += '\\';
-        escaped += c;
-        break;
-      case '~':
-        escaped += "\\textasciitilde{}";
-        break;
-      case '^':
-        escaped += "\\textasciicircum{}";
-        break;
-      case '\\':
-        escaped += "\\textbackslash{}";
-        break;
-      case '<':
-        escaped += "\\textless{}";
-        break;
-      case '>':
-        escaped += "\\textgreater{}";
-        break;
-      default:
-        escaped += c;
-    }
+  for (std::size_t i = 0; i < line.size();) {
+    const std::size_t bytes = letter_bytes(line[i]);
+    escaped += latex_letter(std::string_view(line).substr(i, bytes));
+    i += bytes;
+  }
   return escaped;
 }
 

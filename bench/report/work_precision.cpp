@@ -12,9 +12,8 @@
 #include <tuple>
 
 #include "bench/numbers/pareto.hpp"
-#include "bench/records/record.hpp"
-#include "bench/report/contexts.hpp"
 #include "bench/report/report.hpp"
+#include "bench/report/scenes.hpp"
 #include "bench/settings/json_file.hpp"
 
 namespace amrtex {
@@ -35,12 +34,7 @@ struct Question {
   const char* error() const { return common ? "/error_common" : "/error"; }
 };
 
-/// Records of one scene and context.
-struct Scene {
-  std::string context;
-  std::string name;  ///< data set, view, transfer function, mode
-  Records records;
-};
+using Scene = ComparedScene;
 
 // --- the file ---
 
@@ -70,19 +64,6 @@ Question read_question(const JsonNode& entry) {
 
 // --- points ---
 
-double number_at(const Json& record, const std::string& pointer) {
-  const Json& value = value_at(record, pointer);
-  return value.is_number() ? value.get<double>() : kNotMeasured;
-}
-
-double time_of(const Json& record) { return number_at(record, "/frame/wall_ms/median"); }
-
-/// RMSE as a share of the peak; 0 where the picture is exact, whose PSNR is null.
-double share_of_peak(const Json& record, const std::string& error) {
-  if (number_at(record, error + "/rmse") == 0) return 0;
-  return relative_rmse(number_at(record, error + "/psnr_db"));
-}
-
 std::vector<CostPoint> cost_points(const Records& records, const Question& question) {
   std::vector<CostPoint> points;
   for (const Json* record : records) points.push_back({time_of(*record), share_of_peak(*record, question.error())});
@@ -94,56 +75,6 @@ std::vector<CostPoint> p95_points(const Records& records, const Question& questi
   for (const Json* record : records)
     points.push_back({time_of(*record), number_at(*record, std::string(question.error()) + "/p95")});
   return points;
-}
-
-// --- scenes ---
-
-/// The `render` part of a record without the settings that work is traded for error by.
-Json scene_part(Json render) {
-  for (const char* key :
-       {"consumer", "sampling", "step", "integrator", "tolerance", "skip", "prune", "needs", "early_end", "slice_target", "dispatch",
-        "iso_tolerance", "shadow_step", "level_of_detail", "max_level", "view_name", "transfer_function_name"})
-    render.erase(key);
-  return render;
-}
-
-std::string text_at(const Json& record, const std::string& pointer) {
-  const Json& value = value_at(record, pointer);
-  return value.is_string() ? value.get<std::string>() : "";
-}
-
-std::string scene_name(const Json& record) {
-  std::vector<std::string> parts;
-  for (const char* pointer : {"/dataset/name", "/render/view_name", "/render/transfer_function_name", "/render/mode"})
-    if (const std::string text = text_at(record, pointer); !text.empty()) parts.push_back(text);
-  return fmt::format("{}", fmt::join(parts, ", "));
-}
-
-/// By name. Where errors are those of the own filter, a scene is that of one filter.
-std::vector<Scene> scenes_of(std::span<const Json> records, const Question& question) {
-  std::map<std::string, std::size_t> places;
-  std::vector<Scene> scenes;
-  const ContextNames contexts(records);
-  for (const Json& record : records) {
-    const Json key = Json::array({contexts.of(record), value_at(record, "/dataset/hash"), value_at(record, "/dataset/exact_hash"),
-                                  value_at(record, "/dataset/field"), scene_part(value_at(record, "/render")),
-                                  question.common ? Json() : value_at(record, "/filter")});
-    const auto [place, added] = places.try_emplace(key.dump(), scenes.size());
-    if (added)
-      scenes.push_back(
-          {contexts.of(record), scene_name(record) + (question.common ? "" : ", " + text_at(record, "/filter")), {}});
-    scenes[place->second].records.push_back(&record);
-  }
-  std::stable_sort(scenes.begin(), scenes.end(), [](const Scene& a, const Scene& b) { return a.name < b.name; });
-  return scenes;
-}
-
-std::string what_error(const Question& question, const Records& records) {
-  if (!question.common) return "error: against the reference of the row's own filter; page sizes define different fields";
-  std::set<std::string> filters;
-  for (const Json* record : records)
-    if (const std::string filter = text_at(*record, "/error_common/filter"); !filter.empty()) filters.insert(filter);
-  return fmt::format("error: against the reference of {}, the same for every filter (error_common)", fmt::join(filters, " and "));
 }
 
 // --- tables ---
@@ -184,7 +115,7 @@ Table fastest_table(const Scene& scene, const Question& question) {
   const auto psnr = cost_points(scene.records, question), p95 = p95_points(scene.records, question);
   std::vector<Cell> asked, over_dense;
   Records rows;
-  std::vector<std::string> notes = {what_error(question, scene.records),
+  std::vector<std::string> notes = {what_error(scene.records, question.common),
                                     "time / dense: over that of the fastest setting of `uniform` that reaches the same"};
   for (const Goal& goal : goals_of(question, psnr, p95)) {
     const auto fastest = fastest_within(*goal.points, goal.bound);
@@ -212,7 +143,7 @@ Table front_table(const Scene& scene, const Question& question) {
   Table table = make_setting_table(fmt::format("{}: what no other setting beats, {}", question.title, scene.name), rows,
                                    scene.records, measures_of(question));
   table.constants.emplace(table.constants.begin(), "renderer", scene.context);
-  table.notes.push_back(what_error(question, scene.records));
+  table.notes.push_back(what_error(scene.records, question.common));
   table.notes.push_back(fmt::format("{} of {} points", rows.size(), scene.records.size()));
   return table;
 }
@@ -238,7 +169,7 @@ std::vector<Cell> fastest_times(const Scene& scene, const Question& question, co
 Table encodings_table(const Scene& scene, const Question& question) {
   Table table{fmt::format("{}: the fastest setting of each encoding, frame, wall (ms), {}", question.title, scene.name),
               {{"renderer", scene.context}},
-              {what_error(question, scene.records)},
+              {what_error(scene.records, question.common)},
               {{"encoding", "encoding", "", false}},
               {}};
   const std::vector<CostPoint> none;
@@ -336,7 +267,7 @@ Json tooltip(const Scene& scene, const Question& question) {
 Json footnotes(const Scene& scene, const Question& question) {
   Json lines = Json::array();
   const auto add = [&](const std::string& text) { lines.push_back({{"line", lines.size()}, {"text", text}}); };
-  add(what_error(question, scene.records));
+  add(what_error(scene.records, question.common));
   const auto points = cost_points(scene.records, question);
   if (const auto exact = std::count_if(points.begin(), points.end(), [](const CostPoint& p) { return p.error == 0; }); exact > 0)
     add(fmt::format("{} exact, drawn below the others", exact));
@@ -387,7 +318,7 @@ WorkPrecision make_work_precision(const std::filesystem::path& path, std::span<c
   for (const JsonNode& entry : file.root().items()) {
     if (!entry.find("work_precision")) continue;
     const Question question = read_question(entry);
-    for (const Scene& scene : scenes_of(records, question)) {
+    for (const Scene& scene : compared_scenes(records, question.common)) {
       result.tables.push_back(fastest_table(scene, question));
       result.tables.push_back(front_table(scene, question));
       result.tables.push_back(encodings_table(scene, question));

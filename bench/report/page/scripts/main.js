@@ -1,0 +1,8 @@
+startTheme();
+startRecord();
+startTable();
+startPictures();
+startPlots();
+startAnswers();
+startFoot();
+document.documentElement.dataset.ready = 'yes';

@@ -1,0 +1,45 @@
+# Writes OUTPUT: the texts that report pages are made of, as C++ string literals (run as a script, cmake -P).
+#   FOLDER   bench/report/page
+#   MODULES  the folder of npm packages, or empty: plots are pictures then
+#   VERSION  of amrtex
+set(text "// Made by cmake/EmbedPage.cmake.\n#include \"bench/report/page/page_assets.hpp\"\n\nnamespace amrtex {\nnamespace {\n\n")
+# literals of more than 64 KiB: GCC and Clang take them
+function(embed name contents)
+  string(APPEND text "constexpr char ${name}[] = R\"page_text(${contents})page_text\";\n")
+  set(text "${text}" PARENT_SCOPE)
+endfunction()
+macro(embed_file name file)
+  file(READ ${file} contents)
+  embed(${name} "${contents}")
+endmacro()
+
+embed_file(kPage ${FOLDER}/page.html)
+embed_file(kIndex ${FOLDER}/index.html)
+embed_file(kStyle ${FOLDER}/page.css)
+set(scripts "")
+foreach(module IN ITEMS page_data theme record plots answers table pictures foot main)
+  file(READ ${FOLDER}/scripts/${module}.js contents)
+  string(APPEND scripts "${contents}\n")
+endforeach()
+embed(kScripts "${scripts}")
+set(plots "")
+set(licences "")
+if(MODULES)
+  foreach(package IN ITEMS vega vega-lite vega-embed)
+    file(READ ${MODULES}/${package}/build/${package}.min.js contents)
+    # source maps lie elsewhere, and nothing may be asked for
+    string(REGEX REPLACE "\n//# sourceMappingURL=[^\n]*" "" contents "${contents}")
+    string(APPEND plots "${contents}\n")
+    file(READ ${MODULES}/${package}/package.json about)
+    string(JSON version GET "${about}" version)
+    string(JSON licence GET "${about}" license)
+    file(READ ${MODULES}/${package}/LICENSE contents)
+    string(APPEND licences "${package} ${version} (${licence})\n\n${contents}\n\n")
+  endforeach()
+endif()
+embed(kPlots "${plots}")
+embed(kLicences "${licences}")
+# the length is known: nothing has to be counted
+string(APPEND text "\ntemplate <std::size_t N>\nconstexpr std::string_view text(const char (&array)[N]) {\n  return {array, N - 1};\n}\n")
+string(APPEND text "\n}  // namespace\n\nPageAssets page_assets() { return {text(kPage), text(kIndex), text(kStyle), text(kScripts), text(kPlots), text(kLicences), \"${VERSION}\"}; }\n\n}  // namespace amrtex\n")
+file(WRITE ${OUTPUT} "${text}")
