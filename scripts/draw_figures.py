@@ -2,7 +2,7 @@
 
   draw_figures.py --program build/release/amrtex --out docs/images [FIGURE ...]
 
-Figures: structures, filters, sampling, data_flow, work_precision; without names all of them.
+Figures: structures, filters, data_flow, work_precision; without names all of them.
 """
 import argparse
 import csv
@@ -23,10 +23,6 @@ LEVEL = ["#9aa3b2", "#e08a2e", "#c0392b"]
 SMALL_MESH = {"field": {"type": "shell", "center": [0, 0, 0.125], "radius": 0.35, "width": 0.05, "amplitude": 1},
               "levels": 3, "root": [8, 8, 2], "patch": 4, "max_patch": 16,
               "domain": {"lower": [0, 0, 0], "upper": [1, 1, 0.25]}, "refine": {"criterion": "gradient", "threshold": 0.3}}
-# What a ray crosses.
-RAY_MESH = {"field": {"type": "shell", "center": [0.1, 0.1, 0.25], "radius": 0.62, "width": 0.07, "amplitude": 1},
-            "levels": 3, "root": [8, 8, 4], "patch": 4, "max_patch": 16,
-            "domain": {"lower": [0, 0, 0], "upper": [1, 1, 0.5]}, "refine": {"criterion": "gradient", "threshold": 0.2}}
 # One level jump of ratio 4 along x, on each side of a bump; seen by every filter.
 JUMP_MESH = {"field": {"type": "shell", "center": [-20, 2, 2], "radius": 26.95, "width": 2.2, "amplitude": 1},
              "levels": 2, "root": [12, 4, 4], "ratio": 4, "patch": 4,
@@ -262,47 +258,6 @@ def draw_curve(axes, points, values, jump=0.03):
     axes.svg.polyline([(axes.x(a), axes.y(b)) for a, b in piece], "#1f4e9c", 2)
 
 
-# ---- sampling: lattice and adaptive on one ray
-
-RAY_FROM, RAY_TO = (-0.1, 0.13, 0.2656), (1.1, 0.77, 0.2656)  # world; in the slice that is shown
-SHOWN_STEP = 2  # cell widths, of both modes
-
-
-def sampling(program):
-    mesh = program.mesh("ray", RAY_MESH)
-    direction = [b - a for a, b in zip(RAY_FROM, RAY_TO)]
-    ray = ["--ray", *(repr(v) for v in (*RAY_FROM, *direction))]
-    edge, gap = 440, 30
-    svg = Svg(2 * edge + gap + 28, edge + 92, "Where two modes sample one ray")
-    for i, mode in enumerate(("lattice", "adaptive")):
-        shown = program.structure(mesh, "kd_tree", "linear_lod", [], *ray, f"--sampling={mode}", f"--step={SHOWN_STEP}")
-        left, top = 14 + i * (edge + gap), 34
-        svg.text(left, 22, mode, 15, weight="bold")
-        svg.text(left + 100, 22, f"{len(shown['samples'])} samples", 12, FAINT)
-        svg.rect(left, top, edge, edge, "#fafbfc", "none")
-        draw_boxes(svg, left, top, shown["finest_cells"], shown["regions"], edge)
-        at = lambda p: (left + p[0] * edge, top + edge - p[1] * edge)
-        svg.line(*clipped(at, RAY_FROM, RAY_TO), INK, 1)
-        for sample in shown["samples"]:
-            svg.circle(*at(sample["p"]), 3.2, "#1f4e9c", "#ffffff", 0.8)
-    svg.text(14, edge + 58, f"The same kD-tree and ray, step {SHOWN_STEP}. lattice: a sample each {SHOWN_STEP} cells of the "
-             "finest level, wherever regions begin and end.", 12, FAINT)
-    svg.text(14, edge + 76, f"adaptive: each region is divided into equal intervals of at most {SHOWN_STEP} of its own cells, "
-             "sampled at their middles. Colours: level 0 grey, 1 orange, 2 red.", 12, FAINT)
-    return svg
-
-
-def clipped(at, a, b):
-    """The part of the ray in the unit square, in pixels."""
-    def ends(axis):
-        d = b[axis] - a[axis]
-        return sorted(((0 - a[axis]) / d, (1 - a[axis]) / d))
-    low = max(0, *(ends(k)[0] for k in (0, 1)))
-    high = min(1, *(ends(k)[1] for k in (0, 1)))
-    point = lambda t: [p + t * (q - p) for p, q in zip(a, b)]
-    return (*at(point(low)), *at(point(high)))
-
-
 # ---- the flow of data
 
 BOXES = {  # name: left, top, width, lines; the first is bold
@@ -416,7 +371,7 @@ def fastest_table(least_db=50.0):
     return "\n".join(lines) + "\n"
 
 
-FIGURES = {f.__name__: f for f in (structures, filters, sampling, data_flow, work_precision)}
+FIGURES = {f.__name__: f for f in (structures, filters, data_flow, work_precision)}
 
 
 def main():

@@ -13,7 +13,7 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROGRAM = sys.argv.pop(1) if len(sys.argv) > 1 else str(ROOT / "build/release/amrtex")
 # `filters` needs a GL context, which not every machine has; the others are drawn from files and the CPU alone.
-CHEAP_FIGURES = ["structures", "sampling", "data_flow", "work_precision"]
+CHEAP_FIGURES = ["structures", "data_flow", "work_precision"]
 
 LINK = re.compile(r"!?\[[^\]]*\]\(([^()\s]*(?:\([^()]*\))?[^()\s]*)\)")
 ELSEWHERE = re.compile(r"[a-z]+:")  # http:, https:, mailto:
@@ -106,7 +106,7 @@ class Figures(unittest.TestCase):
     def test_an_unknown_figure_names_those_there_are(self):
         drawn = draw("structure")
         self.assertEqual(drawn.returncode, 2)
-        self.assertIn("structures, filters, sampling, data_flow, work_precision", drawn.stderr)
+        self.assertIn("structures, filters, data_flow, work_precision", drawn.stderr)
 
 
 def shapes(figure):
