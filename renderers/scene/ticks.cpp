@@ -21,7 +21,8 @@ std::string number_text(double value, int digits) {
   std::string text = fmt::format("{:.{}g}", value, digits);
   const std::size_t e = text.find('e');
   if (e == std::string::npos) return text;
-  if (std::abs(value) >= 1 && std::abs(value) < 1e6 && value == std::round(value)) return fmt::format("{:.0f}", value);
+  const bool whole = std::abs(value - std::round(value)) <= 1e-9 * std::abs(value);
+  if (std::abs(value) >= 1 && std::abs(value) < 1e6 && whole) return fmt::format("{:.0f}", value);
   if (text[e + 1] == '+') text.erase(e + 1, 1);
   const std::size_t first = text[e + 1] == '-' ? e + 2 : e + 1;
   while (first + 1 < text.size() && text[first] == '0') text.erase(first, 1);
