@@ -30,10 +30,10 @@ ReferenceField::ReferenceField(const AmrHierarchy& hierarchy, int field)
       PatchView& view = level.patches[k];
       view = {patches[k].box, &values, hierarchy.leaf_mask(l, static_cast<int>(k)).data(), {}, {}, {}};
       values.visit([&](const auto& all) {
-        const std::size_t n = values.size();
-        if (!units_.plain()) view.numbers.reserve(n);
-        for (std::size_t i = 0; i < n && !units_.plain(); ++i) view.numbers.push_back(units_.number(all[i]));
-        for (std::size_t i = 0; i < n; ++i)
+        const std::size_t cells = values.size();
+        if (!units_.plain()) view.numbers.reserve(cells);
+        for (std::size_t i = 0; i < cells && !units_.plain(); ++i) view.numbers.push_back(units_.number(all[i]));
+        for (std::size_t i = 0; i < cells; ++i)
           if (view.leaf[i] != 0 && !std::isfinite(all[i])) missing = true;
       });
       restrict_patch(l, view);
