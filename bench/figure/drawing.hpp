@@ -69,7 +69,9 @@ struct Drawing {
 
   template <class What>
   void add(What what, std::optional<Area> within = std::nullopt) {
-    shapes.push_back({std::move(what), within});
+    Shape& shape = shapes.emplace_back();
+    shape.what.template emplace<What>(std::move(what));
+    shape.within = within;
   }
 };
 

@@ -58,8 +58,7 @@ class Layout {
     drawing_ = {figure_.width, 0, figure_.font, figure_.font_size, {}};
     place_columns();
     place_rows();
-    drawing_.shapes.insert(drawing_.shapes.begin(),
-                           {FilledArea{{0, 0, drawing_.width, drawing_.height}, {1, 1, 1, 1}}, std::nullopt});
+    drawing_.add(FilledArea{{0, 0, drawing_.width, drawing_.height}, {1, 1, 1, 1}});
     for (const Cell& cell : cells_) draw_cell(cell);
     return std::move(drawing_);
   }
