@@ -309,7 +309,7 @@ TEST(HeatMap, UnknownNamesAreRefusedWithTheNearestOne) {
 
 TEST(HeatMap, ThePixelsOfAnAxisParallelViewCountTheCellsBelowThem) {
   const AmrHierarchy mesh = corner_mesh();
-  const auto context = make_context(parse_context_kind("egl"));
+  const auto context = make_context(parse_context("egl"));
   Scene scene = from_above(4);
   scene.view.height = 2;  // the domain is the middle half of the picture
   scene.settings.mode = Mode::projection;

@@ -52,7 +52,7 @@ Experiment experiment_of(const Json& record, const PanelSpec& panel) {
 }
 
 Experiment experiment_of_data(const PanelSpec& panel) {
-  const AmrHierarchy mesh(read_mesh(panel.data, panel.field.empty() ? std::vector<std::string>() : std::vector{panel.field}));
+  const AmrHierarchy mesh(read_mesh(panel.data, FieldChoice::one(panel.field)));
   SceneRequest request;
   request.data = panel.data;
   request.view_name = panel.view;

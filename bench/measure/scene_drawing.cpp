@@ -16,7 +16,7 @@ SceneDrawing::~SceneDrawing() = default;
 
 Consumer& SceneDrawing::consumer() {
   if (consumer_) return *consumer_;
-  context_ = make_context(parse_context_kind(experiment_.context));
+  context_ = make_context(parse_context(experiment_.context));
   built_ = build_structure(experiment_, build(), mesh_, scene_, *context_);
   consumer_ = make_consumer(*context_, mesh_, built_->structure, scene_);
   return *consumer_;
