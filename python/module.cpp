@@ -328,7 +328,9 @@ void add_requests(py::module_& m) {
       .def_readwrite("where", &RunRequest::where)
       .def_readwrite("only", &RunRequest::only)
       .def_readwrite("set", &RunRequest::set)
-      .def_readwrite("context", &RunRequest::context)
+      .def_property(
+          "context", [](const RunRequest& r) { return r.context.context; },
+          [](RunRequest& r, std::string name) { r.context.context = std::move(name); })
       .def_readwrite("memory_limit", &RunRequest::memory_limit)
       .def_readwrite("process_limit", &RunRequest::process_limit)
       .def_readwrite("time_limit", &RunRequest::time_limit)
