@@ -16,9 +16,11 @@ struct OptionalFolder {
 
   std::filesystem::path path() const {
     const char* given = std::getenv(variable);
-    return given != nullptr ? std::filesystem::path(given) : std::filesystem::path(AMRTEX_SOURCE_DIR) / ".." / "shared" / name;
+    return given != nullptr ? std::filesystem::path(given) : beside();
   }
   std::filesystem::path operator/(const std::filesystem::path& inside) const { return path() / inside; }
+  /// The folder beside the project, whatever the variable says.
+  std::filesystem::path beside() const { return std::filesystem::path(AMRTEX_SOURCE_DIR) / ".." / "shared" / name; }
   /// Why there is nothing to test.
   std::string absent(const std::filesystem::path& file) const {
     return "no " + file.string() + "; set " + variable + " to the folder that holds it to run this test";
