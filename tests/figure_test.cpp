@@ -141,11 +141,16 @@ TEST_F(Figures, APngHasTheSizeAndTheResolutionThatWereAsked) {
 
 // ---- layout ----
 
+/// Colour bars are one pixel wide or high, and many long.
+bool is_bar(const Bitmap& bitmap) {
+  return std::min(bitmap.width, bitmap.height) == 1 && std::max(bitmap.width, bitmap.height) > 16;
+}
+
 std::vector<Area> images(const Drawing& drawing) {
   std::vector<Area> areas;
   for (const Shape& s : drawing.shapes)
     if (const auto* image = std::get_if<Image>(&s.what);
-        image != nullptr && image->bitmap->width > 1 && image->bitmap->height > 1)
+        image != nullptr && !is_bar(*image->bitmap))
       areas.push_back(image->area);
   return areas;
 }
