@@ -108,7 +108,7 @@ TEST(Tables, ShowWhatVariesAndSayTheRestOnce) {
                                                       {"filter", "linear_page"},
                                                       {"picture (pixels)", "64 x 32"},
                                                       {"page_table", "centring cell"}}));
-  EXPECT_THAT(table.notes, ElementsAre("no values: frame GPU (ms), PSNR (dB)", "of 4 points: 3 ok, 1 unsupported"));
+  EXPECT_THAT(table.notes, ElementsAre("no values: frame GPU (ms), draws in a GPU query (above 1: throughput), PSNR (dB)", "of 4 points: 3 ok, 1 unsupported"));
 }
 
 Json unchecked(Json r) {

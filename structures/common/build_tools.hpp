@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "structures/common/coded_range.hpp"
 #include "structures/common/encoding.hpp"
 
 namespace amrtex {
@@ -18,13 +19,6 @@ struct ValueRange {
   void add(double value);
   bool operator==(const ValueRange&) const = default;
 };
-
-/// Code of a range that holds no value: no mesh.
-inline constexpr std::uint32_t kNoRange = 0xffffffffU;
-/// Code of a region where the drawn field has no value and another one has: the mesh is there, and the
-/// range covers nothing. It decodes to a minimum of infinity and a maximum at the origin: most volumes may
-/// skip it, and no isovalue has all of it on one side, so that a ray does not take a side there.
-inline constexpr std::uint32_t kVacantRange = 0x00007f80U;
 
 /// What ranges are relative to: at most every number that the shader can return.
 double range_origin(const FieldStatistics& statistics, Storage storage, StorageScale scale);

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "structures/common/build_tools.hpp"
+#include "structures/common/coded_range.hpp"
 
 namespace amrtex {
 namespace {
