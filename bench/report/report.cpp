@@ -42,6 +42,7 @@ Cell cell_of(const Json& json) {
 struct Group {
   Records records;                                                  ///< in the order of the rows
   std::map<std::string, std::set<std::string>> varying_parameters;  ///< encoding -> keys
+  std::map<std::string, Records> dense;  ///< scene_key() -> those of the encoding uniform that have a time
 };
 
 /// A setting is left out of the columns where it is the same everywhere; a measure is not.
@@ -161,11 +162,24 @@ bool is_linear(const Json& record) { return text_of(at(record, "/filter")) != "n
 
 bool same(const Json& a, const Json& b, const char* pointer) { return at(a, pointer) == at(b, pointer); }
 
-/// How well `candidate` serves as what `record` is measured against; 0 = not at all.
-int baseline_rank(const Json& candidate, const Json& record) {
-  if (candidate.at("encoding") != "uniform" || !at(candidate, "/frame/wall_ms/median").is_number()) return 0;
+/// What is drawn: only pictures of the same are compared in time.
+std::string scene_key(const Json& record) {
+  std::string key;
   for (const char* scene : {"/dataset/hash", "/dataset/exact_hash", "/dataset/field", "/render"})
-    if (!same(candidate, record, scene)) return 0;
+    key += at(record, scene).dump() + "\n";
+  return key;
+}
+
+std::map<std::string, Records> dense_by_scene(const Records& records) {
+  std::map<std::string, Records> dense;
+  for (const Json* record : records)
+    if (record->at("encoding") == "uniform" && at(*record, "/frame/wall_ms/median").is_number())
+      dense[scene_key(*record)].push_back(record);
+  return dense;
+}
+
+/// How well `candidate`, of the same scene, serves as what `record` is measured against; 0 = not at all.
+int baseline_rank(const Json& candidate, const Json& record) {
   if (!same(candidate, record, "/filter")) return is_linear(candidate) && is_linear(record) ? 1 : 0;
   if (!same(candidate, record, "/filtering")) return 2;
   return same(candidate, record, "/storage") ? 4 : 3;
@@ -174,9 +188,11 @@ int baseline_rank(const Json& candidate, const Json& record) {
 Cell relative_cell(const Json& record, const Group& group) {
   const Json& time = at(record, "/frame/wall_ms/median");
   if (!time.is_number()) return std::monostate();
+  const auto dense = group.dense.empty() ? group.dense.end() : group.dense.find(scene_key(record));
+  if (dense == group.dense.end()) return std::monostate();
   const Json* baseline = nullptr;
   int best = 0;
-  for (const Json* candidate : group.records)
+  for (const Json* candidate : dense->second)
     if (const int rank = baseline_rank(*candidate, record); rank > best) {
       baseline = candidate;
       best = rank;
@@ -354,6 +370,12 @@ std::map<std::string, std::set<std::string>> varying_parameters(const Records& r
   return keys;
 }
 
+Group group_of(const Records& records) {
+  Group group{in_order(records), varying_parameters(records, true), {}};
+  group.dense = dense_by_scene(group.records);
+  return group;
+}
+
 std::vector<Cell> column_cells(const ColumnRule& rule, const Group& group) {
   std::vector<Cell> cells;
   for (const Json* record : group.records) cells.push_back(rule.cell(*record, group));
@@ -433,7 +455,7 @@ Table make_table(const std::string& experiment, const std::string& renderer, con
   Table table;
   table.title = experiment;
   table.constants.emplace_back("renderer", renderer);
-  const Group group{in_order(records), varying_parameters(records, true)};
+  const Group group = group_of(records);
   table.rows.resize(records.size());
   const auto chosen = options.columns.find(experiment);
   if (chosen == options.columns.end())
@@ -456,7 +478,7 @@ std::optional<Table> make_split_table(const std::string& experiment, const std::
   Table table;
   table.title = experiment + ": error by cause (RMSE)";
   table.constants.emplace_back("renderer", renderer);
-  const Group group{in_order(explained), varying_parameters(explained, true)};
+  const Group group = group_of(explained);
   table.rows.resize(explained.size());
   for (const ColumnRule& rule : all_columns()) {
     const std::vector<Cell> cells = column_cells(rule, group);
@@ -508,7 +530,7 @@ Table make_setting_table(std::string title, std::span<const Json* const> rows, s
   Table table;
   table.title = std::move(title);
   table.rows.resize(rows.size());
-  const Group group{in_order({all.begin(), all.end()}), varying_parameters({all.begin(), all.end()}, true)};
+  const Group group = group_of({all.begin(), all.end()});
   const auto add = [&](const ColumnRule& rule) {
     std::vector<Cell> cells;
     for (const Json* record : rows) cells.push_back(record != nullptr ? rule.cell(*record, group) : Cell());
