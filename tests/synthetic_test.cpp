@@ -102,7 +102,7 @@ TEST(BlobsShell, IsTheDefaultAndCountsItsCells) {
           "levels": 4, "root": [64, 64, 64], "ratio": [2, 2, 2], "patch": 16, "refine": {"criterion": "gradient", "threshold": 0.14},
           "level_jump": 1})"));
   for (std::size_t l = 0; l < 4; ++l) ASSERT_EQ(by_default.levels[l].size(), by_name.levels[l].size());
-  EXPECT_EQ(by_default.levels[3][100].values, by_name.levels[3][100].values);
+  EXPECT_EQ(by_default.levels[3][100].values.at(0).doubles(), by_name.levels[3][100].values.at(0).doubles());
   const AmrHierarchy mesh(by_default);
   EXPECT_EQ(mesh.stored_cells(), 6168576);
   EXPECT_EQ(mesh.leaf_cells(), 5430272);

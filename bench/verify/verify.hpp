@@ -55,7 +55,7 @@ struct Report {
 };
 
 struct VerifyOptions {
-  ContextChoice context;
+  ContextChoice context = {};
   bool full = false;       ///< the experiment's size, not the one of a few minutes
   bool list = false;       ///< no case is run: all are reported as skipped, "listed"
   std::size_t one_in = 1;  ///< each case is asked of one in so many encodings and filters, the next case of the next ones
