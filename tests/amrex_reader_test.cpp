@@ -20,12 +20,14 @@
 #include "structures/readers/amrex_plotfile/amrex_plotfile.hpp"
 #include "structures/readers/mesh_io.hpp"
 #include "tests/optional_data.hpp"
+#include "tests/reader_files.hpp"
 
 namespace amrtex {
 namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
+using test::message_of;
 
 // ---- helpers ----
 
@@ -60,16 +62,6 @@ void edit(const fs::path& path, const std::string& from, const std::string& to) 
   const auto at = text.find(from);
   ASSERT_NE(at, std::string::npos) << path << " does not hold '" << from << "'";
   write_text(path, text.replace(at, from.size(), to));
-}
-
-template <class Failure = Error, class F>
-std::string message_of(F&& action) {
-  try {
-    action();
-  } catch (const Failure& failure) {
-    return failure.what();
-  }
-  return "(nothing was thrown)";
 }
 
 struct LevelSpec {

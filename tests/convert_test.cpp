@@ -82,7 +82,7 @@ TEST_F(Convert, BadArraysOfNumPyAreRefused) {
     auto arrays = good;
     arrays[name] = array;
     write_npz(at("bad.npz"), arrays);
-    return refusal_of([&] { AmrHierarchy(read_mesh(at("bad.npz"))).content_hash(0); });
+    return message_of([&] { AmrHierarchy(read_mesh(at("bad.npz"))).content_hash(0); });
   };
   EXPECT_THAT(refusal("levels", {"<f8", {3}, std::string(24, '\0')}),
               AllOf(HasSubstr("bad.npz"), HasSubstr("levels"), HasSubstr("<i4")));
@@ -94,9 +94,9 @@ TEST_F(Convert, BadArraysOfNumPyAreRefused) {
   EXPECT_THAT(refusal("ratios", {"<i4", {2}, std::string(8, '\0')}), HasSubstr("ratio"));
   EXPECT_THAT(refusal("domain", {"<f8", {2, 3}, std::string(48, '\0')}), HasSubstr("corners"));
   write("none.npz", "PK\x03\x04 and nothing");
-  EXPECT_THAT(refusal_of([&] { read_mesh(at("none.npz")); }), HasSubstr("none.npz"));
+  EXPECT_THAT(message_of([&] { read_mesh(at("none.npz")); }), HasSubstr("none.npz"));
   write_npz(at("other.npz"), {{"picture", {"<f4", {1}, std::string(4, '\0')}}});
-  EXPECT_THAT(refusal_of([&] { read_mesh(at("other.npz")); }), HasSubstr("no array 'ratios'; it is no mesh"));
+  EXPECT_THAT(message_of([&] { read_mesh(at("other.npz")); }), HasSubstr("no array 'ratios'; it is no mesh"));
 }
 
 TEST_F(Convert, CutArraysOfNumPyAreRefused) {
@@ -104,7 +104,7 @@ TEST_F(Convert, CutArraysOfNumPyAreRefused) {
   const std::string bytes = bytes_of_file(at("m.npz"));
   for (std::size_t cut = 0; cut < bytes.size(); cut += 7) {
     write("m.npz", std::string_view(bytes).substr(0, cut));
-    EXPECT_THAT(refusal_of([&] { read_mesh(at("m.npz")); }), HasSubstr("m.npz")) << cut;
+    EXPECT_THAT(message_of([&] { read_mesh(at("m.npz")); }), HasSubstr("m.npz")) << cut;
   }
 }
 
@@ -261,24 +261,24 @@ TEST_F(Convert, TheEndingOrTheFormatSaysWhatIsWritten) {
   EXPECT_EQ(bytes_of_file(at("b.cells")).substr(0, 2), "PK");
   write_mesh(mesh, at("c"), "exabrick");
   EXPECT_EQ(AmrHierarchy(read_mesh(at("c"))).content_hash(0), mesh.content_hash(0));
-  EXPECT_THAT(refusal_of([&] { write_mesh(mesh, at("d"), "vtk"); }),
+  EXPECT_THAT(message_of([&] { write_mesh(mesh, at("d"), "vtk"); }),
               AllOf(HasSubstr("no format 'vtk'"), HasSubstr("vtkhdf (.vtkhdf)")));
-  EXPECT_THAT(refusal_of([&] { write_mesh(mesh, at("d.h5")); }), AllOf(HasSubstr("d.h5"), HasSubstr("are not written")));
+  EXPECT_THAT(message_of([&] { write_mesh(mesh, at("d.h5")); }), AllOf(HasSubstr("d.h5"), HasSubstr("are not written")));
 }
 
 TEST_F(Convert, NothingIsReplacedAndNothingIsLeftBehind) {
   const AmrHierarchy mesh = nested(waves).hierarchy();
   for (const char* name : {"m", "m.npz", "m.cells", "m.vtkhdf"}) {
     write(name, "taken");
-    EXPECT_THAT(refusal_of([&] { write_mesh(mesh, at(name)); }), AllOf(HasSubstr(name), HasSubstr("exists already")));
+    EXPECT_THAT(message_of([&] { write_mesh(mesh, at(name)); }), AllOf(HasSubstr(name), HasSubstr("exists already")));
     EXPECT_EQ(bytes_of_file(at(name)), "taken");
-    EXPECT_THAT(refusal_of([&] { write_mesh(mesh, at("no") / name); }), HasSubstr("no"));
+    EXPECT_THAT(message_of([&] { write_mesh(mesh, at("no") / name); }), HasSubstr("no"));
   }
   MeshDescription unnameable = nested(waves).description();
   unnameable.fields = {"a/b\n"};
   const AmrHierarchy refused(std::move(unnameable));
   for (const char* name : {"r", "r.npz", "r.vtkhdf"})
-    EXPECT_THAT(refusal_of([&] { write_mesh(refused, at(name)); }), HasSubstr("field name"));
+    EXPECT_THAT(message_of([&] { write_mesh(refused, at(name)); }), HasSubstr("field name"));
   EXPECT_THAT(names(), ElementsAre("m", "m.cells", "m.npz", "m.vtkhdf"));
 }
 
@@ -311,8 +311,8 @@ TEST_F(Convert, FilesAreGivenTheirNamesTogether) {
     UnfinishedFolder folder(at("m.cells"));
     write("b", "taken");
     for (const char* name : {"a", "b"}) std::ofstream(folder.path() / name) << "new";
-    EXPECT_THAT(refusal_of([&] { folder.publish_files({"a", "b"}); }), HasSubstr("exists already"));
-    EXPECT_THAT(refusal_of([&] { folder.publish_files({"a", "none"}); }), HasSubstr("none"));
+    EXPECT_THAT(message_of([&] { folder.publish_files({"a", "b"}); }), HasSubstr("exists already"));
+    EXPECT_THAT(message_of([&] { folder.publish_files({"a", "none"}); }), HasSubstr("none"));
   }
   EXPECT_THAT(names(), ElementsAre("b"));
 }

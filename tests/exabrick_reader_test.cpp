@@ -52,7 +52,7 @@ class ExaBrick : public FolderTest {
   }
   std::string refusal(const Cells& cells) const {
     const fs::path file = write_set("bad", cells);
-    return refusal_of([&] { AmrHierarchy(read_mesh(file)).content_hash(0); });
+    return message_of([&] { AmrHierarchy(read_mesh(file)).content_hash(0); });
   }
   static std::string hash(const fs::path& file) { return AmrHierarchy(read_mesh(file)).content_hash(0); }
 };
@@ -171,7 +171,7 @@ TEST_F(ExaBrick, AFolderOfOneDataSetNamesIt) {
   write_set("a", one_refined());
   EXPECT_EQ(hash(folder_), hash(at("a.cells")));
   write_set("b", one_refined());
-  EXPECT_THAT(refusal_of([&] { read_mesh(folder_); }), AllOf(HasSubstr("a.cells, b.cells"), HasSubstr("name one")));
+  EXPECT_THAT(message_of([&] { read_mesh(folder_); }), AllOf(HasSubstr("a.cells, b.cells"), HasSubstr("name one")));
 }
 
 TEST_F(ExaBrick, IsKnownByItsSizesUnderAnyName) {
@@ -179,7 +179,7 @@ TEST_F(ExaBrick, IsKnownByItsSizesUnderAnyName) {
   fs::rename(at("a.cells"), at("a.leaves"));
   EXPECT_EQ(AmrHierarchy(read_mesh(at("a.leaves"))).leaf_cells(), 15);
   write_values("a.scalars", counted(14));
-  EXPECT_THAT(refusal_of([&] { read_mesh(at("a.leaves")); }), HasSubstr("not in a format that can be read"));
+  EXPECT_THAT(message_of([&] { read_mesh(at("a.leaves")); }), HasSubstr("not in a format that can be read"));
 }
 
 // ---- real data ----
@@ -271,29 +271,29 @@ TEST_F(ExaBrick, SizesThatDoNotFitAreRefused) {
   write_set("a", one_refined());
   const std::string cells = bytes_of_file(at("a.cells"));
   write("a.cells", cells.substr(0, 30));
-  EXPECT_THAT(refusal_of([&] { read_mesh(at("a.cells")); }), AllOf(HasSubstr("a.cells: 30 bytes"), HasSubstr("16 bytes")));
+  EXPECT_THAT(message_of([&] { read_mesh(at("a.cells")); }), AllOf(HasSubstr("a.cells: 30 bytes"), HasSubstr("16 bytes")));
   write("a.cells", cells.substr(0, 32));
-  EXPECT_THAT(refusal_of([&] { read_mesh(at("a.cells")); }), HasSubstr("a.cells: 2 cells, but its scalars are 15 values"));
+  EXPECT_THAT(message_of([&] { read_mesh(at("a.cells")); }), HasSubstr("a.cells: 2 cells, but its scalars are 15 values"));
   write("a.cells", cells);
   write("a.scalars", "abcde");
-  EXPECT_THAT(refusal_of([&] { read_mesh(at("a.cells")); }), AllOf(HasSubstr("a.scalars: 5 bytes"), HasSubstr("4 bytes")));
+  EXPECT_THAT(message_of([&] { read_mesh(at("a.cells")); }), AllOf(HasSubstr("a.scalars: 5 bytes"), HasSubstr("4 bytes")));
   fs::remove(at("a.scalars"));
-  EXPECT_THAT(refusal_of([&] { read_mesh(at("a.cells")); }), HasSubstr("no file a.scalars beside it"));
+  EXPECT_THAT(message_of([&] { read_mesh(at("a.cells")); }), HasSubstr("no file a.scalars beside it"));
   fs::remove(at("a.cells"));
   write_values("a.scalars", counted(15));
-  EXPECT_THAT(refusal_of([&] { read_mesh(at("a.scalars")); }), HasSubstr("no file a.cells beside it"));
+  EXPECT_THAT(message_of([&] { read_mesh(at("a.scalars")); }), HasSubstr("no file a.cells beside it"));
 }
 
 TEST_F(ExaBrick, UnknownFieldsAreNamed) {
   const fs::path file = write_set("density", one_refined());
-  EXPECT_THAT(refusal_of([&] { read_mesh(file, {"densty"}); }), AllOf(HasSubstr("no field 'densty'"), HasSubstr("density")));
+  EXPECT_THAT(message_of([&] { read_mesh(file, {"densty"}); }), AllOf(HasSubstr("no field 'densty'"), HasSubstr("density")));
 }
 
 TEST_F(ExaBrick, BadBricksAreRefused) {
   write_values("b.scalars", counted(15));
   const auto refusal_of_bricks = [&](const Cells& words) {
     write_values("b.bricks", words);
-    return refusal_of([&] { AmrHierarchy(read_mesh(at("b.bricks"))).content_hash(0); });
+    return message_of([&] { AmrHierarchy(read_mesh(at("b.bricks"))).content_hash(0); });
   };
   EXPECT_THAT(refusal_of_bricks({1, 1, 1, 0, 0, 0, 0, 15}),
               AllOf(HasSubstr("b.bricks: brick 0"), HasSubstr("number is 15"), HasSubstr("15 values")));
@@ -314,7 +314,7 @@ TEST_F(ExaBrick, BadExaFilesAreRefused) {
   write_set("a", one_refined());
   const auto refusal_of_exa = [&](const std::string& text) {
     write("x.exa", text);
-    return refusal_of([&] { read_mesh(at("x.exa")); });
+    return message_of([&] { read_mesh(at("x.exa")); });
   };
   EXPECT_THAT(refusal_of_exa("scalar a a.scalars\n"), HasSubstr("names no `bricks`"));
   EXPECT_THAT(refusal_of_exa("cells a.cells\n"), HasSubstr("names no `scalar`"));
@@ -336,7 +336,7 @@ TEST_F(ExaBrick, CutFilesAreRefused) {
     const fs::path named = at(name == std::string("a.scalars") ? "a.cells" : name);
     for (std::size_t cut = 0; cut < bytes.size(); ++cut) {
       write(name, std::string_view(bytes).substr(0, cut));
-      EXPECT_THAT(refusal_of([&] { read_mesh(named); }), HasSubstr(folder_.string())) << name << " cut to " << cut;
+      EXPECT_THAT(message_of([&] { read_mesh(named); }), HasSubstr(folder_.string())) << name << " cut to " << cut;
     }
     write(name, bytes);
   }
@@ -347,7 +347,7 @@ TEST_F(ExaBrick, SparseFilesCostNothing) {
   write("big.scalars", "");
   fs::resize_file(at("big.cells"), std::uintmax_t{16} << 32);
   fs::resize_file(at("big.scalars"), std::uintmax_t{4} << 32);
-  EXPECT_THAT(refusal_of([&] { read_mesh(at("big.cells")); }), HasSubstr("big.cells"));
+  EXPECT_THAT(message_of([&] { read_mesh(at("big.cells")); }), HasSubstr("big.cells"));
   EXPECT_LT(peak_bytes(), std::int64_t{4} << 30);
 }
 
@@ -375,15 +375,15 @@ TEST_F(ExaBrick, SeveralFieldsAreSeveralFilesOfScalars) {
 }
 
 TEST_F(ExaBrick, WhatItCannotHoldIsRefusedAndLeavesNothing) {
-  EXPECT_THAT(refusal_of([&] {
+  EXPECT_THAT(message_of([&] {
                 write_exabrick(nested(waves, {3, 2}).hierarchy(), at("m.cells"));
               }),
               AllOf(HasSubstr("m.cells"), HasSubstr("6 of the finest wide"), HasSubstr("2^n")));
   const AmrHierarchy large = MeshBuilder(Vec3i(2)).root(constant(1e300)).hierarchy();
-  EXPECT_THAT(refusal_of([&] { write_exabrick(large, at("m.cells")); }), AllOf(HasSubstr("1e+300"), HasSubstr("32 bits")));
+  EXPECT_THAT(message_of([&] { write_exabrick(large, at("m.cells")); }), AllOf(HasSubstr("1e+300"), HasSubstr("32 bits")));
   EXPECT_TRUE(names().empty());
   write("m.scalars", "taken");
-  EXPECT_THAT(refusal_of([&] { write_exabrick(nested(waves).hierarchy(), at("m.cells")); }),
+  EXPECT_THAT(message_of([&] { write_exabrick(nested(waves).hierarchy(), at("m.cells")); }),
               HasSubstr("m.scalars: exists already"));
   EXPECT_THAT(names(), ElementsAre("m.scalars"));
 }

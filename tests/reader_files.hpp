@@ -15,7 +15,16 @@
 
 namespace amrtex::test {
 
-/// A test with a temporary folder.
+inline void write_bytes(const std::filesystem::path& path, std::string_view bytes) {
+  std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+}
+
+inline std::string bytes_of_file(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// A test with a temporary folder, which is removed at its end.
 class FolderTest : public ::testing::Test {
  protected:
   FolderTest() {
@@ -30,7 +39,7 @@ class FolderTest : public ::testing::Test {
   std::filesystem::path at(const std::string& name) const { return folder_ / name; }
 
   std::filesystem::path write(const std::string& name, std::string_view bytes) const {
-    std::ofstream(at(name), std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    write_bytes(at(name), bytes);
     return at(name);
   }
   template <class T>
@@ -48,20 +57,18 @@ class FolderTest : public ::testing::Test {
   std::filesystem::path folder_;
 };
 
-inline std::string bytes_of_file(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
+/// What message_of() answers where an action succeeds.
+inline constexpr const char* kNothingThrown = "(nothing was thrown)";
 
-/// The message of an Error, or "accepted"; any other exception ends the test.
-template <class F>
-std::string refusal_of(F&& f) {
+/// What an action says that throws a Failure; any other exception ends the test.
+template <class Failure = Error, class F>
+std::string message_of(F&& action) {
   try {
-    f();
-    return "accepted";
-  } catch (const Error& e) {
-    return e.what();
+    action();
+  } catch (const Failure& failure) {
+    return failure.what();
   }
+  return kNothingThrown;
 }
 
 }  // namespace amrtex::test

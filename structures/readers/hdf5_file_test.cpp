@@ -33,7 +33,7 @@ std::vector<double> counted(std::size_t count) {
 TEST_F(Hdf5Layer, KnowsFilesByTheirFirstBytesAndBehindAUserBlock) {
   write_bytes(folder_ / "text", "not HDF5 at all");
   { const Hdf5Writer out(file()); }
-  write_bytes(folder_ / "block", std::string(1024, '#') + bytes_of(file()));
+  write_bytes(folder_ / "block", std::string(1024, '#') + bytes_of_file(file()));
   EXPECT_TRUE(Hdf5File::has_signature(file()));
   EXPECT_TRUE(Hdf5File::has_signature(folder_ / "block"));
   EXPECT_FALSE(Hdf5File::has_signature(folder_ / "text"));
@@ -98,7 +98,7 @@ TEST_F(Hdf5Layer, ReadsPartsOfDataSetsTheSameInEveryPacking) {
 
 TEST_F(Hdf5Layer, ReadsBehindAUserBlock) {
   { Hdf5Writer(file()).numbers("values", {1000}, counted(1000)); }
-  write_bytes(file(), std::string(2048, '#') + bytes_of(file()));
+  write_bytes(file(), std::string(2048, '#') + bytes_of_file(file()));
   EXPECT_EQ(read_part(Hdf5File(file()).open_numbers("values", 1), 0, 1000), counted(1000));
 }
 
@@ -246,7 +246,7 @@ TEST_F(Hdf5Layer, RefusesCompoundsWhoseMembersLieOutsideOfThem) {
     out.records("records", {"lo_i", "hi_i"}, {1, 2, 3, 4});
     out.record_attribute("/", "record", {"lo_i", "hi_i"}, {1, 9});
   }
-  std::string bytes = bytes_of(file());
+  std::string bytes = bytes_of_file(file());
   const auto places = places_of("hi_i", bytes);
   ASSERT_EQ(places.size(), 2U);
   for (const std::size_t at : places) bytes.replace(at + 8, 2, "\xff\xff");
@@ -259,7 +259,7 @@ TEST_F(Hdf5Layer, RefusesCompoundsWhoseMembersLieOutsideOfThem) {
 
 TEST_F(Hdf5Layer, SaysWhatIsWrongWithAFile) {
   { Hdf5Writer(file()).numbers("values", {1000}, counted(1000)); }
-  const std::string whole = bytes_of(file());
+  const std::string whole = bytes_of_file(file());
   const auto nothing = [](const Hdf5File&) {};
   write_bytes(file(), std::string_view(whole).substr(0, 4000));
   EXPECT_THAT(refusal(nothing), HasSubstr("file.h5: cannot be opened as HDF5: truncated file"));

@@ -1,11 +1,10 @@
-// What tests of the HDF5 readers share: a folder of their own, files written with the library, a mesh that every format holds.
+// What tests of the HDF5 readers share: files written with the library, a mesh that every format holds.
 #pragma once
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <hdf5.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -14,40 +13,9 @@
 #include <vector>
 
 #include "structures/mesh/amr_hierarchy.hpp"
+#include "tests/reader_files.hpp"
 
 namespace amrtex::test {
-
-/// A folder of one test alone that is removed at its end.
-class FolderTest : public ::testing::Test {
- protected:
-  FolderTest() {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = std::filesystem::temp_directory_path() /
-              fmt::format("amrtex_{}_{}_{}", info->test_suite_name(), info->name(), ::getpid());
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  ~FolderTest() override { std::filesystem::remove_all(folder_); }
-  std::filesystem::path folder_;
-};
-
-template <class Failure = Error, class F>
-std::string message_of(F&& action) {
-  try {
-    action();
-  } catch (const Failure& failure) {
-    return failure.what();
-  }
-  return "(nothing was thrown)";
-}
-
-inline std::string bytes_of(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-inline void write_bytes(const std::filesystem::path& path, std::string_view bytes) {
-  std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-}
 
 enum class Packing { contiguous, chunked, deflate };
 
@@ -300,7 +268,7 @@ inline void expect_mesh(const MeshDescription& found, const MeshDescription& wri
 template <class Read>
 void expect_cuts_to_be_refused(const std::filesystem::path& file, std::size_t cuts, Read&& read) {
   const std::string whole_hash = AmrHierarchy(read()).content_hash(0);
-  const std::string bytes = bytes_of(file);
+  const std::string bytes = bytes_of_file(file);
   for (std::size_t i = 0; i < cuts; ++i) {
     const std::size_t kept = i * bytes.size() / cuts;
     write_bytes(file, std::string_view(bytes).substr(0, kept));

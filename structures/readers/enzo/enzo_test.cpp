@@ -18,7 +18,7 @@ class Enzo : public FolderTest {
   }
   /// Replaces the first occurrence in a file; the test is wrong where there is none.
   void edit(const char* file, const std::string& from, const std::string& to) const {
-    std::string text = bytes_of(folder_ / file);
+    std::string text = bytes_of_file(folder_ / file);
     const auto at = text.find(from);
     ASSERT_NE(at, std::string::npos) << from;
     write_bytes(folder_ / file, text.replace(at, from.size(), to));
@@ -162,7 +162,7 @@ TEST_F(Enzo, SaysWhichFilesToName) {
 TEST_F(Enzo, RefusesFilesThatAreCut) {
   for (const char* file : {"run", "run.hierarchy", "run.cpu0001"}) {
     write_enzo(folder_, mesh_of_blocks({"Density"}));
-    const std::string whole = bytes_of(folder_ / file);
+    const std::string whole = bytes_of_file(folder_ / file);
     const std::string hash = AmrHierarchy(read_mesh(folder_)).content_hash(0);
     for (std::size_t i = 0; i < 61; ++i) {
       write_bytes(folder_ / file, std::string_view(whole).substr(0, i * whole.size() / 61));
