@@ -58,13 +58,30 @@ TEST(ChangedScene, HasItsPointsAndIsovaluesMovedByAHundredthOfTheirRange) {
 
 TEST(Change, UploadsTheSameFewBytesWhateverTheMesh) {
   for (const Mode mode : {Mode::dvr, Mode::iso}) {
-    const ChangeTimes coarse = changes(blobs(2), blob_scene(mode), 3), fine = changes(blobs(4), blob_scene(mode), 3);
+    Scene scene = blob_scene(mode);
+    scene.settings.leap = Leap::off;
+    const ChangeTimes coarse = changes(blobs(2), scene, 3), fine = changes(blobs(4), scene, 3);
     EXPECT_THAT(fine.wall_ms, SizeIs(3));
     EXPECT_THAT(fine.wall_ms, Each(Gt(0)));
     EXPECT_EQ(fine.bytes, coarse.bytes);
     EXPECT_GT(fine.bytes, 0);
     EXPECT_LT(fine.bytes, 256);
   }
+}
+
+TEST(Change, UploadsHalfAByteALeafCellAtMostForLeaps) {
+  for (const int levels : {2, 4}) {
+    const AmrHierarchy h = blobs(levels);
+    EXPECT_LE(changes(h, blob_scene(Mode::dvr), 1).bytes, 256 + h.leaf_cells() / 2);
+  }
+}
+
+TEST(Change, OfASceneThatHidesNothingToOneThatDoesIsMeasured) {
+  Scene scene = blob_scene(Mode::dvr);
+  // blobs are not negative: only the changed scene hides something
+  scene.transfer_function.extinction = {{0, 0}, {1, 5}};
+  scene.transfer_function.color = {{0, {1, 0, 0}}};
+  EXPECT_THAT(changes(blobs(3), scene, 2).wall_ms, SizeIs(2));
 }
 
 TEST(Change, IsRefusedWhereTheStructureWouldBeAnother) {

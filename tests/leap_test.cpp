@@ -11,17 +11,37 @@ namespace {
 
 using namespace test;
 
+std::vector<AmrHierarchy> meshes() {
+  std::vector<AmrHierarchy> all;
+  all.push_back(nested(waves, {3, 2}).hierarchy());
+  for (const std::uint64_t seed : {41, 42, 43}) {
+    RandomMeshOptions options;
+    options.max_finest_cells = 1 << 15;
+    all.emplace_back(random_mesh(seed, options));
+  }
+  return all;
+}
+
 TEST(LeapGrid, HasTheSmallestBlocksOfWhichThereAreFewEnough) {
-  // 64^3 = 2^18
-  EXPECT_EQ(LeapGrid::over({512, 512, 512}).shift, 3);
-  EXPECT_EQ(LeapGrid::over({512, 512, 512}).blocks, Vec3i(64));
-  EXPECT_EQ(LeapGrid::over({64, 64, 65}).shift, 1);
-  EXPECT_EQ(LeapGrid::over({5, 3, 2}).blocks, Vec3i(5, 3, 2));
-  EXPECT_TRUE(LeapGrid::over({(1 << 30) + 1, 1, 1}).empty());
+  const std::int64_t most = 64 * 64 * 64;
+  EXPECT_EQ(LeapGrid::over({512, 512, 512}, most).shift, 3);
+  EXPECT_EQ(LeapGrid::over({512, 512, 512}, most).blocks, Vec3i(64));
+  EXPECT_EQ(LeapGrid::over({64, 64, 65}, most).shift, 1);
+  EXPECT_EQ(LeapGrid::over({5, 3, 2}, most).blocks, Vec3i(5, 3, 2));
+  EXPECT_EQ(LeapGrid::over({5, 3, 2}, 1).blocks, Vec3i(1));
+  EXPECT_TRUE(LeapGrid::over({(1 << 30) + 1, 1, 1}, most).empty());
+}
+
+TEST(LeapGrid, HasABlockForSixteenLeafCellsAtMost) {
+  for (const AmrHierarchy& h : meshes()) {
+    const LeapGrid grid = LeapGrid::over(h);
+    EXPECT_LE(16 * std::ssize(grid.ranges), std::max<std::int64_t>(16, h.leaf_cells()));
+    EXPECT_GT(8 * 16 * std::ssize(grid.ranges), h.leaf_cells()) << "half of the edge would be allowed";
+  }
 }
 
 TEST(LeapGrid, ABlockHasTheRangeOfAllThatReachesIntoIt) {
-  LeapGrid grid = LeapGrid::over({128, 128, 128});
+  LeapGrid grid = LeapGrid::over({128, 128, 128}, 64 * 64 * 64);
   ASSERT_EQ(grid.shift, 1);
   const auto code = [](double min, double max) { return encode_range({min, max}, 0, Storage::r32f, {}); };
   grid.cover({Vec3i(0), Vec3i(3)}, code(1, 2));
@@ -48,17 +68,6 @@ Scene half_hidden(const AmrHierarchy& h, Sampling sampling) {
 Scene without_leaps(Scene scene) {
   scene.settings.leap = Leap::off;
   return scene;
-}
-
-std::vector<AmrHierarchy> meshes() {
-  std::vector<AmrHierarchy> all;
-  all.push_back(nested(waves, {3, 2}).hierarchy());
-  for (const std::uint64_t seed : {41, 42, 43}) {
-    RandomMeshOptions options;
-    options.max_finest_cells = 1 << 15;
-    all.emplace_back(random_mesh(seed, options));
-  }
-  return all;
 }
 
 // Samples of a lattice belong to the ray: what is hidden adds nothing, one region or many at a time.

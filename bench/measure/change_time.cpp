@@ -58,11 +58,14 @@ ChangeTimes time_changes(Context& context, const DomainGeometry& geometry, const
   if (scene.settings.prune) throw UnsupportedError("time of a change: with 'prune' what was hidden is not there to be shown");
   const Scene other = changed_scene(scene);
   const EncodedField& field = structure.field;
-  const SceneBindings before = bind_scene(geometry, field, scene), after = bind_scene(geometry, field, other);
+  // both scenes by one shader, also where one of them hides nothing
+  const auto defines = [&](const Scene& s) { return bind_scene(geometry, field, s).defines; };
+  const LeapMap leaps = defines(scene) == defines(other) ? LeapMap::where_something_is_hidden : LeapMap::always;
+  const SceneBindings before = bind_scene(geometry, field, scene, leaps), after = bind_scene(geometry, field, other, leaps);
   if (before.defines != after.defines) throw UnsupportedError("time of a change: the changed scene needs another shader");
   ShaderKey vertex;
   vertex.entry = "fullscreen.vert";
-  const SceneResources first(context, geometry, field, scene);
+  const SceneResources first(context, geometry, field, scene, leaps);
   Program program(context, assemble_shader(vertex), assemble_shader(first.shader_key("raycast.frag", false)));
   first.bind(program, structure.gpu);
   ChangeTimes result;
@@ -70,7 +73,7 @@ ChangeTimes time_changes(Context& context, const DomainGeometry& geometry, const
   for (int i = 0; i < times; ++i) {
     context.gl().Finish();
     const Stopwatch watch;
-    const SceneResources resources(context, geometry, field, i % 2 == 0 ? other : scene);
+    const SceneResources resources(context, geometry, field, i % 2 == 0 ? other : scene, leaps);
     resources.bind(program, structure.gpu);
     context.gl().Finish();
     result.wall_ms.push_back(watch.seconds() * 1000);

@@ -65,17 +65,18 @@ HostTexture packed(const std::vector<std::uint8_t>& distances) {
 
 }  // namespace
 
-void add_leaps(const EncodedField& field, const Scene& stored, SceneBindings& b) {
+void add_leaps(const EncodedField& field, const Scene& stored, LeapMap map, SceneBindings& b) {
   std::vector<std::uint8_t> seen;
-  if (leaps(field, stored)) {
+  const bool may_leap = leaps(field, stored);
+  if (may_leap) {
     const Hides hides(field, stored);
     seen.resize(field.leaps.ranges.size());
     std::transform(field.leaps.ranges.begin(), field.leaps.ranges.end(), seen.begin(),
                    [&](std::uint32_t code) { return hides(code) ? 0 : 1; });
   }
-  const bool any_hidden = std::find(seen.begin(), seen.end(), 0) != seen.end();
-  b.define("AMRTEX_LEAPS", any_hidden ? static_cast<int>(stored.settings.leap) : 0);
-  if (!any_hidden) return;
+  const bool has_map = may_leap && (map == LeapMap::always || std::find(seen.begin(), seen.end(), 0) != seen.end());
+  b.define("AMRTEX_LEAPS", has_map ? static_cast<int>(stored.settings.leap) : 0);
+  if (!has_map) return;
   const Vec3i& blocks = field.leaps.blocks;
   b.buffers.push_back(packed(stored.settings.leap == Leap::octant ? octants(blocks, seen) : chessboard_distances(blocks, seen)));
   b.uniforms.push_back({"u_leap_blocks", std::vector<int>{blocks.x, blocks.y, blocks.z}});

@@ -7,9 +7,14 @@
 
 namespace amrtex {
 
-/// The map of distances, from the field's value ranges and what the scene hides; none where nothing is hidden, where the encoding
-/// tells no ranges, or where a ray's own state decides what it may skip (isosurfaces, mip, pre-integration, several fields).
+enum class LeapMap {
+  where_something_is_hidden,
+  always,  ///< a change of transfer function that hides nothing, or all of a sudden something, then keeps the shader
+};
+
+/// The map of distances, from the field's value ranges and what the scene hides; none as `map` tells, where the encoding tells no
+/// ranges, or where a ray's own state decides what it may skip (isosurfaces, mip, pre-integration, several fields).
 /// `stored`: the scene in stored units.
-void add_leaps(const EncodedField& field, const Scene& stored, SceneBindings& bindings);
+void add_leaps(const EncodedField& field, const Scene& stored, LeapMap map, SceneBindings& bindings);
 
 }  // namespace amrtex

@@ -143,7 +143,7 @@ const char* raycast_entry(const Scene& scene) {
   return scene.settings.triangles.empty() ? "raycast.frag" : "raycast_triangles.frag";
 }
 
-SceneBindings bind_scene(const DomainGeometry& geometry, const EncodedField& field, const Scene& scene) {
+SceneBindings bind_scene(const DomainGeometry& geometry, const EncodedField& field, const Scene& scene, LeapMap leaps) {
   const RenderSettings& s = scene.settings;
   validate(scene);
   require_resolved(geometry, scene);
@@ -158,7 +158,7 @@ SceneBindings bind_scene(const DomainGeometry& geometry, const EncodedField& fie
   add_picture_units(geometry, field, scene, b);
   add_march(geometry, scene, b);
   add_transfer_function(geometry, stored, b);
-  add_leaps(field, stored, b);
+  add_leaps(field, stored, leaps, b);
   add_clip_planes(geometry, s, b);
   add_ray_offset(s, b);
   add_mirror(s, b);

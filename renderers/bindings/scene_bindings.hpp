@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "renderers/bindings/leap_bindings.hpp"
 #include "renderers/bindings/shader_assembler.hpp"
 #include "renderers/bindings/shader_inputs.hpp"
 #include "renderers/scene/scene.hpp"
@@ -18,8 +19,9 @@ UniformValues field_uniforms(const DomainGeometry& geometry, const EncodedField&
 /// The shader that samples field number `number` at points.
 ShaderKey probe_key(const EncodedField& field, int number);
 
-/// Everything that a consumer of shaders/march.glsl needs beside the field's own part.
-SceneBindings bind_scene(const DomainGeometry& geometry, const EncodedField& field, const Scene& scene);
+/// Everything that a consumer of shaders/march.glsl needs beside the field's own part. `leaps`: as of add_leaps().
+SceneBindings bind_scene(const DomainGeometry& geometry, const EncodedField& field, const Scene& scene,
+                         LeapMap leaps = LeapMap::where_something_is_hidden);
 
 /// The shader of entry file `entry` with the defines of field and scene.
 ShaderKey scene_key(const std::string& entry, const EncodedField& field, const SceneBindings& bindings, bool counting);

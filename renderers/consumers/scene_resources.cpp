@@ -21,8 +21,9 @@ GlBuffer upload(Context& context, const HostTexture& host) {
 
 }  // namespace
 
-SceneResources::SceneResources(Context& context, const DomainGeometry& geometry, const EncodedField& field, const Scene& scene)
-    : field_(&field), bindings_(bind_scene(geometry, field, scene)) {
+SceneResources::SceneResources(Context& context, const DomainGeometry& geometry, const EncodedField& field, const Scene& scene,
+                               LeapMap leaps)
+    : field_(&field), bindings_(bind_scene(geometry, field, scene, leaps)) {
   for (const HostTexture& b : bindings_.buffers) buffers_.push_back(upload(context, b));
 }
 

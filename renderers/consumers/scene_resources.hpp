@@ -15,7 +15,8 @@ namespace amrtex {
 class SceneResources {
  public:
   /// `field` must outlive the object.
-  SceneResources(Context& context, const DomainGeometry& geometry, const EncodedField& field, const Scene& scene);
+  SceneResources(Context& context, const DomainGeometry& geometry, const EncodedField& field, const Scene& scene,
+                 LeapMap leaps = LeapMap::where_something_is_hidden);
 
   ShaderKey shader_key(const std::string& entry, bool counting) const { return scene_key(entry, *field_, bindings_, counting); }
   /// Uses the program, sets what the scene tells it and binds the field.

@@ -248,6 +248,8 @@ void Context::initialize(GlContextInfo known, LoadFunction load, const ContextOp
 }
 
 std::int64_t Context::free_memory_bytes() {
+  // llvmpipe has the extensions, tells 0 at first and a few KiB later
+  if (info_.free_memory_bytes == 0) return 0;
   make_current();
   return get_free_memory(*gl_, info_);
 }

@@ -17,14 +17,19 @@ std::uint32_t hull(std::uint32_t a, std::uint32_t b) {
 
 }  // namespace
 
-LeapGrid LeapGrid::over(const Vec3i& cells) {
+LeapGrid LeapGrid::over(const Vec3i& cells, std::int64_t most) {
   LeapGrid grid;
   if (std::max({cells.x, cells.y, cells.z}) > 1 << 30) return grid;
   const auto blocks = [&](int shift) { return ceil_div(cells, 1 << shift); };
-  while (Box{Vec3i(0), blocks(grid.shift)}.cells() > kMostLeapBlocks) ++grid.shift;
+  while (Box{Vec3i(0), blocks(grid.shift)}.cells() > most) ++grid.shift;
   grid.blocks = blocks(grid.shift);
   grid.ranges.assign(static_cast<std::size_t>(Box{Vec3i(0), grid.blocks}.cells()), kNoRange);
   return grid;
+}
+
+LeapGrid LeapGrid::over(const AmrHierarchy& h) {
+  const std::int64_t by_cells = std::max<std::int64_t>(1, h.leaf_cells() / kLeafCellsPerLeapBlock);
+  return over(h.cells(h.finest_level()), std::min(kMostLeapBlocks, by_cells));
 }
 
 void LeapGrid::cover(const Box& box, std::uint32_t range) {

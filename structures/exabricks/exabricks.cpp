@@ -251,7 +251,7 @@ Json statistics(const Options& o, const Plan& p) {
 
 /// From the regions' ranges.
 LeapGrid leap_grid(const AmrHierarchy& h, const Plan& p, EncodedField& field) {
-  LeapGrid grid = LeapGrid::over(h.cells(h.finest_level()));
+  LeapGrid grid = LeapGrid::over(h);
   const auto* codes = field.find("exa_ranges")->as<std::uint32_t>();
   for (const Region& r : p.set.regions) grid.cover(r.box, *codes++);
   return grid;

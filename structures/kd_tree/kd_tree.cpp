@@ -265,7 +265,7 @@ void write_bricks(const AmrHierarchy& h, const BuildRequest& request, const Opti
 
 /// From the leaves' ranges, as they were written.
 LeapGrid leap_grid(const AmrHierarchy& h, const Options& o, const Plan& p, EncodedField& field) {
-  LeapGrid grid = LeapGrid::over(h.cells(h.finest_level()));
+  LeapGrid grid = LeapGrid::over(h);
   const auto* words = field.find("kd_data")->as<std::uint32_t>() + (o.bindless ? 2 : 1);
   for (const Leaf& leaf : p.tree.leaves) {
     grid.cover(leaf.cells.refined(h.cell_width(leaf.level)), *words);

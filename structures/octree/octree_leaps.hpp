@@ -36,7 +36,7 @@ inline void cover_with_leaves(const AmrHierarchy& h, const EncodedField& field, 
 /// Of what is drawn first, from the written ranges of nodes where there are any.
 inline LeapGrid leap_grid(const AmrHierarchy& h, const BuildRequest& request, const Tree& tree, const TreeReader& reader,
                           const EncodedField& field) {
-  LeapGrid grid = LeapGrid::over(h.cells(h.finest_level()));
+  LeapGrid grid = LeapGrid::over(h);
   const HostTexture* codes = field.find("octree_ranges");
   for (int level = 0; level < h.level_count(); ++level) {
     const int shift = std::countr_zero(static_cast<unsigned>(h.cell_width(level)));

@@ -213,7 +213,7 @@ Json statistics(const AmrHierarchy& h, const Options& o, const std::vector<Page>
 }
 
 LeapGrid leap_grid(const AmrHierarchy& h, const Options& o, const std::vector<Page>& pages, const EncodedField& field) {
-  LeapGrid grid = LeapGrid::over(h.cells(h.finest_level()));
+  LeapGrid grid = LeapGrid::over(h);
   for (const Page& p : pages) {
     if (p.kind == AMRTEX_PAGE_ABSENT) continue;
     const double constant = field.scale.units.value(static_cast<double>(std::bit_cast<float>(p.green)));

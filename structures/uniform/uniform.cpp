@@ -247,7 +247,7 @@ class Writer {
 
 /// From the blocks' ranges.
 LeapGrid leap_grid(const AmrHierarchy& h, const Plan& p, EncodedField& field) {
-  LeapGrid grid = LeapGrid::over(h.cells(h.finest_level()));
+  LeapGrid grid = LeapGrid::over(h);
   const auto* codes = field.find("dense_ranges")->as<std::uint32_t>();
   for_each_cell(Box{Vec3i(0), p.blocks}, [&](const Vec3i& block) {
     const Box cells = intersection(Box{block, block + Vec3i(1)}.refined(kBlock), h.domain(p.level));

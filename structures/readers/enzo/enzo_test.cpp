@@ -70,7 +70,7 @@ TEST_F(Enzo, DrawsTwoDimensionsAsASlab) {
 
 TEST_F(Enzo, SaysTheUnitOfStoredValuesAlone) {
   write_enzo(folder_, mesh_of_blocks(kFields));
-  const std::string lines = bytes_of(folder_ / "run");
+  const std::string lines = bytes_of_file(folder_ / "run");
   EXPECT_EQ(read_mesh(folder_).units, std::vector<std::string>(kFields.size()));
   write_bytes(folder_ / "run", lines + "DataUnits[0] = g/cm^3\n#DataCGSConversionFactor[0] = 1\nDataUnits[1] = none\n");
   EXPECT_EQ(read_mesh(folder_).units[0], "g/cm^3");
