@@ -17,6 +17,7 @@ namespace amrtex {
 namespace {
 
 using testing::AllOf;
+using testing::ContainsRegex;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
@@ -94,7 +95,8 @@ TEST(PageData, IsMadeOfNumbersThatAreNoneInEveryColumn) {
       const PageData page = page_data({part}, {.title = "t", .question = "", .conclusion = "", .picked = {}});
       const std::string text = page_html(page, Scripts::inside);
       EXPECT_THAT(text, AllOf(Not(HasSubstr(":nan")), HasSubstr("\"labels\""))) << pointer;
-      for (const Plot& plot : report_plots(part.records)) EXPECT_THAT(to_svg(plot), Not(HasSubstr("nan"))) << pointer;
+      for (const Plot& plot : report_plots(part.records))
+        EXPECT_THAT(to_svg(plot), Not(ContainsRegex("=\"[^\"]*nan"))) << pointer << ": names may be anything, places may not";
     }
 }
 
