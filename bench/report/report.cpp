@@ -89,8 +89,10 @@ Cell mebibytes(const Json& record, const Group&) {
 template <Path path>
 Cell timing(const Json& record, const Group&) {
   const Json& time = at(record, path.text);
-  if (!time.is_object()) return std::monostate();
-  return Spread{at(time, "/median").get<double>(), at(time, "/mad").get<double>()};
+  const Json& median = at(time, "/median");
+  const Json& deviation = at(time, "/mad");
+  if (!median.is_number() || !deviation.is_number()) return std::monostate();
+  return Spread{median.get<double>(), deviation.get<double>()};
 }
 
 /// A name where the record has one, else the whole value.

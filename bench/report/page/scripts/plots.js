@@ -31,6 +31,10 @@ function showTip(point, x, y) {
 
 const pointOf = (item) => (item && item.datum && Number.isInteger(item.datum.point) ? item.datum.point : null);
 
+/** More marks are drawn as a picture: an element each takes the page's time. */
+const MOST_ELEMENTS = 500;
+const marksOf = (spec) => [spec, ...(spec.layer ?? [])].reduce((sum, layer) => sum + (layer.data?.values?.length ?? 0), 0);
+
 async function drawPlot(box, plot) {
   const spec = structuredClone(plot.spec);
   for (const layer of spec.layer ?? []) if (layer.mark.style === 'ink-line') layer.mark.color = cssColor('--ink');
@@ -38,7 +42,7 @@ async function drawPlot(box, plot) {
   if (compact)  // long names leave no room for what they name
     for (const layer of spec.layer ?? []) if (layer.encoding.y.type === 'ordinal') layer.encoding.y.axis.labelLimit = 120;
   const result = await vegaEmbed(box, spec, {
-    mode: 'vega-lite', renderer: 'svg', ast: true, config: plotConfig(box.clientWidth),
+    mode: 'vega-lite', renderer: marksOf(spec) > MOST_ELEMENTS ? 'canvas' : 'svg', ast: true, config: plotConfig(box.clientWidth),
     actions: { export: true, source: false, compiled: false, editor: false },
     tooltip: (_, event, item) => {
       const point = pointOf(item);
@@ -53,13 +57,24 @@ async function drawPlot(box, plot) {
   box.dataset.drawn = 'yes';
 }
 
-/** Drawn when it comes into sight: compiling a plot takes longer than looking at another. */
+/** Drawn when it comes into sight, one at a time and after what somebody types: compiling a plot takes longer than looking at another. */
+const waitingPlots = [];
+const whenIdle = window.requestIdleCallback ?? ((then) => setTimeout(then, 0));
+
+async function drawWaiting() {
+  const box = waitingPlots[0];
+  const shown = shownPlots.find((one) => one.box === box);
+  if (shown && !box.dataset.drawn) await drawPlot(shown.box, shown.plot);
+  waitingPlots.shift();
+  if (waitingPlots.length > 0) whenIdle(drawWaiting);
+}
+
 const plotWatcher = new IntersectionObserver((entries) => {
   for (const entry of entries) {
     if (!entry.isIntersecting) continue;
     plotWatcher.unobserve(entry.target);
-    const shown = shownPlots.find(({ box }) => box === entry.target);
-    if (shown) drawPlot(shown.box, shown.plot);
+    waitingPlots.push(entry.target);
+    if (waitingPlots.length === 1) whenIdle(drawWaiting);
   }
 }, { rootMargin: '400px' });
 
