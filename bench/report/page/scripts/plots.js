@@ -59,7 +59,7 @@ async function drawPlot(box, plot) {
 
 /** Drawn when it comes into sight, one at a time and after what somebody types: compiling a plot takes longer than looking at another. */
 const waitingPlots = [];
-const whenIdle = window.requestIdleCallback ?? ((then) => setTimeout(then, 0));
+const whenIdle = (then) => (window.requestIdleCallback ? requestIdleCallback(then, { timeout: 300 }) : setTimeout(then, 0));
 
 async function drawWaiting() {
   const box = waitingPlots[0];
