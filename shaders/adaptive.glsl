@@ -1,4 +1,4 @@
-// Sampling `adaptive`: each region is divided into equal intervals of at most `step` of its own cells.
+// Samplings `adaptive` and `planned`: each region is divided into equal intervals of at most `step` of its own cells, or of what is planned.
 #if AMRTEX_CPP || AMRTEX_INTEGRATOR == AMRTEX_INTEGRATOR_TOLERANCE
 #include "tolerance.glsl"
 #endif
@@ -73,7 +73,8 @@ real march_adaptive_region(INOUT(Accumulation) a, IN(Region) r, IN(vec3r) f, IN(
     return from;
   }
   // a float counts to 2^24: the host refuses smaller steps, and no loop is endless
-  real count = clamp(ceil(length * inverse_width / u_step - real(1e-4)), real(1), real(16777216));
+  real intervals = AMRTEX_PLANNED != 0 ? length / planned_step(r, f, direction, length) : length * inverse_width / u_step;
+  real count = clamp(ceil(intervals - real(1e-4)), real(1), real(16777216));
   real interval = length / count;
   if (AMRTEX_CONSTANT_REGIONS) {
     ray_real first = begin + ray_real(interval * (from - real(0.5)));

@@ -1,6 +1,7 @@
 // The one integration loop: raycaster, CPU renderer and later consumers share it.
 #include "sample.glsl"
 #include "leap.glsl"
+#include "plan.glsl"
 #include "lattice.glsl"
 #include "adaptive.glsl"
 

@@ -43,6 +43,7 @@ struct BuildOptions {
   bool validity = false;
   bool border = false;
   bool gradients = false;
+  bool variation = false;
   std::vector<std::array<double, 2>> invisible = {};
   std::int64_t memory_limit = std::numeric_limits<std::int64_t>::max();  ///< bytes
 };
@@ -71,6 +72,7 @@ inline BuildRequest build_request(const EncodingCase& c, const BuildOptions& opt
   request.needs.validity = options.validity;
   request.needs.border = options.border;
   request.needs.gradients = options.gradients;
+  request.needs.variation = options.variation;
   request.needs.invisible = options.invisible;
   request.parameters = c.parameters;
   request.memory_limit = options.memory_limit;

@@ -11,6 +11,7 @@
 #include "renderers/bindings/light_bindings.hpp"
 #include "renderers/bindings/picture_units.hpp"
 #include "renderers/bindings/scene_needs.hpp"
+#include "renderers/bindings/plan_bindings.hpp"
 #include "renderers/bindings/transfer_bindings.hpp"
 #include "renderers/scene/scene_settings.hpp"
 #include "renderers/scene/stored_units.hpp"
@@ -159,6 +160,7 @@ SceneBindings bind_scene(const DomainGeometry& geometry, const EncodedField& fie
   add_march(geometry, scene, b);
   add_transfer_function(geometry, stored, b);
   add_leaps(field, stored, leaps, b);
+  add_plan(geometry, field, stored, b);
   add_clip_planes(geometry, s, b);
   add_ray_offset(s, b);
   add_mirror(s, b);

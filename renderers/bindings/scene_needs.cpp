@@ -57,6 +57,7 @@ SceneNeeds scene_needs(const Scene& scene, Filter filter, Filtering filtering) {
   needs.draw_boxes = scene.settings.consumer != ConsumerKind::raycast;
   needs.everything = scene.settings.everything;
   needs.value_ranges = scene.settings.skip || needs.everything;
+  needs.variation = scene.settings.sampling == Sampling::planned;
   needs.field_ranges = needs.value_ranges && !scene.more_fields.empty();
   const Shading shading = scene.settings.draws_surfaces() ? scene.settings.isosurfaces.shading : Shading::none;
   const bool lit =

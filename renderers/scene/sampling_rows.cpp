@@ -63,7 +63,11 @@ Rows sampling_rows() {
                    .type = choice_type(texts_of(kSamplingNames)),
                    .reference = AffectsReference::no,
                    .help = "where samples lie ([docs/sampling.md](sampling.md))",
-                   .column = {"sampling"}},
+                   .column = {"sampling"},
+                   .takes = {{"mode", {"dvr", "projection"}, Otherwise::refused, "others have no error that a step leaves", {"planned"}},
+                             {"consumer", {"raycast"}, Otherwise::unsupported, "steps are planned along a whole ray", {"planned"}},
+                             {"integrator", {"exponential_midpoint"}, Otherwise::refused, "its errors are those that are planned", {"planned"}},
+                             {"transfer_functions", {Json::array()}, Otherwise::refused, "steps are planned for one field", {"planned"}}}},
                   [](const Scene& s) -> Json { return sampling_name(s.settings.sampling); },
                   [](Scene& s, const Json& v) { s.settings.sampling = parse_sampling(v.get<std::string>()); }});
   rows.push_back(
@@ -73,9 +77,20 @@ Rows sampling_rows() {
         .help = "distance of samples: of the finest level's cells (`lattice`) or of the region's (`adaptive`), smallest edge",
         .unit = "cell widths",
         .column = {"step (cells)", true},
-        .takes = {means_nothing_unless("integrator", with_step)}},
+        .takes = {means_nothing_unless("integrator", with_step), means_nothing_unless("sampling", {"lattice", "adaptive"})}},
        [](const Scene& s) -> Json { return s.settings.step; },
        [](Scene& s, const Json& v) { s.settings.step = v.get<double>(); }});
+  rows.push_back(
+      {{.name = "budget",
+        .type = number_above(0, 1),
+        .reference = AffectsReference::no,
+        .help = "what a ray's intervals may add to the error of a channel, by the sum of their estimates: in channels (`dvr`) or in parts of "
+                "the field's range times the domain's longest edge (`projection`)",
+        .recorded = Recorded::where_it_applies,
+        .column = {"budget", true},
+        .takes = {means_nothing_unless("sampling", {"planned"})}},
+       [](const Scene& s) -> Json { return s.settings.budget; },
+       [](Scene& s, const Json& v) { s.settings.budget = v.get<double>(); }});
   rows.push_back(
       {{.name = "tolerance",
         .type = number_above(0, 1),

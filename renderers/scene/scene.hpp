@@ -80,7 +80,9 @@ void validate(const TransferFunction& transfer_function);
 
 /// `iso` draws isosurfaces, `dvr_iso` isosurfaces inside the volume.
 enum class Mode { dvr, projection, mip, iso, dvr_iso };
-enum class Sampling { lattice, adaptive };
+/// Samples at equal distances along a ray; at distances of the region's own cells; or at distances of which the host says for each
+/// place how far a budget lets them be apart.
+enum class Sampling { lattice, adaptive, planned };
 /// How rays pass what is hidden (the same numbers as AMRTEX_LEAPS_... in shaders/leap.glsl): region by region, by one map of
 /// distances, or by one for each octant of directions.
 enum class Leap { off, cube, octant };
@@ -190,6 +192,7 @@ struct RenderSettings {
   Integrator integrator = Integrator::exponential_midpoint;
   Dispatch dispatch = Dispatch::fragment;  ///< consumer `raycast`
   double tolerance = 1e-3;          ///< error asked of every channel of a pixel; integrator `tolerance` alone
+  double budget = 1e-3;             ///< what the intervals of a ray may add to the error of a channel; sampling `planned` alone
   double step = 1;                  ///< cell widths (smallest edge): of the finest level for lattice, of the region for adaptive
   int width = 512;                  ///< pixels
   int height = 512;                 ///< pixels

@@ -18,7 +18,8 @@ struct Name {
 
 inline constexpr std::array<Name<Mode>, 5> kModeNames{
     {{Mode::dvr, "dvr"}, {Mode::projection, "projection"}, {Mode::mip, "mip"}, {Mode::iso, "iso"}, {Mode::dvr_iso, "dvr_iso"}}};
-inline constexpr std::array<Name<Sampling>, 2> kSamplingNames{{{Sampling::lattice, "lattice"}, {Sampling::adaptive, "adaptive"}}};
+inline constexpr std::array<Name<Sampling>, 3> kSamplingNames{
+    {{Sampling::lattice, "lattice"}, {Sampling::adaptive, "adaptive"}, {Sampling::planned, "planned"}}};
 inline constexpr std::array<Name<Leap>, 3> kLeapNames{{{Leap::off, "off"}, {Leap::cube, "cube"}, {Leap::octant, "octant"}}};
 inline constexpr std::array<Name<ConsumerKind>, 4> kConsumerNames{{{ConsumerKind::raycast, "raycast"},
                                                                    {ConsumerKind::multipass, "multipass"},

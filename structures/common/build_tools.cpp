@@ -212,6 +212,7 @@ EncodedField start_field(const Encoding& encoding, const AmrHierarchy& hierarchy
   const bool scaled = request.storage != Storage::r32f && request.storage != Storage::r64f;
   field.range_origin = range_origin(s, request.storage, field.scale);
   field.invisible = request.needs.invisible;
+  if (request.needs.variation) field.variation = VariationGrid::of(hierarchy, request.field, field.scale.units);
   field.shader.file = fmt::format("{0}/{0}.glsl", encoding.name());
   field.shader.defines = {{"AMRTEX_FILTER", static_cast<int>(request.needs.filter)},
                           {"AMRTEX_HARDWARE_FILTERING", field.filtering == Filtering::hardware ? 1 : 0},

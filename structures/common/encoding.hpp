@@ -15,6 +15,7 @@
 #include "structures/common/leap_grid.hpp"
 #include "structures/common/parameter.hpp"
 #include "structures/common/part.hpp"
+#include "structures/common/variation_grid.hpp"
 #include "structures/mesh/amr_hierarchy.hpp"
 #include "structures/mesh/filter.hpp"
 #include "structures/mesh/json.hpp"
@@ -61,6 +62,7 @@ struct SceneNeeds {
   bool everything = false;          ///< nothing is left out for want of need: what leaving out saves is measured against this
   bool validity = false;            ///< bits are kept though every cell has a value
   bool border = false;              ///< a border is kept though the filter reads none
+  bool variation = false;           ///< steps are chosen by how much the field varies: EncodedField::variation
   bool field_ranges = false;        ///< several fields are drawn: those beside the first have value ranges as well
   /// First and last value of intervals without extinction, ascending (renderers/bindings/scene_bindings.hpp): parts of the
   /// structure whose values lie in one of them are left out. Empty: all are kept.
@@ -108,6 +110,7 @@ struct EncodedField {
   std::vector<HostTexture> textures;
   std::vector<std::pair<std::string, Vec3i>> integer_uniforms;  ///< ivec3 uniforms of the encoding's GLSL
   LeapGrid leaps;      ///< empty where regions have no ranges, or where the encoding tells none: then rays pass region by region
+  VariationGrid variation;  ///< of the first field; empty where no scene asks for it (SceneNeeds::variation)
   DrawTree draw_tree;  ///< empty where no consumer needs it, or where the encoding has no such boxes
   std::vector<LeftOut> left_out;
   Json statistics;                   ///< counts of the structure: pages, nodes, fill, ...

@@ -1,4 +1,4 @@
-// Patches in parts that are small enough for arrays over one, and what the filter reads about their cells.
+// What the filter reads about the cells of a part of a patch.
 #pragma once
 
 #include <cmath>
@@ -7,25 +7,11 @@
 #include <vector>
 
 #include "structures/common/build_tools.hpp"
+#include "structures/common/patch_parts.hpp"
 #include "structures/mesh/amr_hierarchy.hpp"
 #include "structures/mesh/level_values.hpp"
 
 namespace amrtex {
-
-/// Parts of the patches of a level, small enough for arrays over one.
-struct PatchPart {
-  std::size_t patch;
-  Box box;
-};
-inline std::vector<PatchPart> patch_parts(std::span<const Patch> patches) {
-  constexpr int kEdge = 32;
-  std::vector<PatchPart> parts;
-  for (std::size_t k = 0; k < patches.size(); ++k)
-    for_each_cell(patches[k].box.coarsened(kEdge), [&](const Vec3i& i) {
-      parts.push_back({k, intersection({i * kEdge, (i + Vec3i(1)) * kEdge}, patches[k].box)});
-    });
-  return parts;
-}
 
 /// Smallest and largest of each 3^3 values around a cell.
 class WindowRanges {
