@@ -114,9 +114,13 @@ std::vector<double> densities(const DomainGeometry& geometry, const EncodedField
   return of_blocks;
 }
 
+/// What the estimates of a ray's intervals may come to, in budgets: they take the worst place of a block for all of it, and errors
+/// cancel in part. Measured (tests/plan_test.cpp): of pictures of values without rule the largest error is 0.3 of the sum at most.
+constexpr double kSumOfEstimates = 2;
+
 /// What a ray's intervals may be off by together, in what is integrated.
 double total_budget(const DomainGeometry& geometry, const EncodedField& field, const Scene& stored) {
-  const double budget = stored.settings.budget;
+  const double budget = kSumOfEstimates * stored.settings.budget;
   if (stored.settings.draws_volume()) return budget;
   const Vec3d size = geometry.size();
   const double longest = std::max({size.x, size.y, size.z}) / geometry.smallest_edge();

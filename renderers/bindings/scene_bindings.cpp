@@ -87,6 +87,15 @@ void add_march(const DomainGeometry& geometry, const Scene& scene, SceneBindings
   b.define("AMRTEX_ISOVALUES", s.draws_surfaces() ? static_cast<int>(s.isosurfaces.values.size()) : 0);
 }
 
+/// What follows f between samples takes no filter that jumps.
+void require_interpolation(std::string_view setting, Filter filter) {
+  if (interpolates(filter)) return;
+  std::vector<std::string_view> accepted;
+  for (const Filter other : interpolating_filters()) accepted.push_back(filter_name(other));
+  throw UnsupportedError(fmt::format("{}: the filter {} jumps from cell to cell, which no interval follows; accepted are {}", setting,
+                                     filter_name(filter), fmt::join(accepted, ", ")));
+}
+
 void add_integrator(const DomainGeometry& geometry, const Scene& scene, const FilterDefinition& definition, SceneBindings& b) {
   const RenderSettings& s = scene.settings;
   b.define("AMRTEX_INTEGRATOR", static_cast<int>(s.integrator));
@@ -94,13 +103,7 @@ void add_integrator(const DomainGeometry& geometry, const Scene& scene, const Fi
   if (by_tolerance || s.integrator == Integrator::preintegrated)
     add_knots(scene.transfer_function, extinction_unit(geometry, scene.transfer_function), b);
   if (!by_tolerance) return;
-  if (!interpolates(definition.filter)) {
-    std::vector<std::string_view> accepted;
-    for (const Filter filter : interpolating_filters()) accepted.push_back(filter_name(filter));
-    throw UnsupportedError(
-        fmt::format("integrator tolerance: the filter {} jumps from cell to cell, which no interval follows; accepted are {}",
-                    filter_name(definition.filter), fmt::join(accepted, ", ")));
-  }
+  require_interpolation("integrator tolerance", definition.filter);
   b.define("AMRTEX_CONTINUOUS", filter_info(definition.filter).continuity == Continuity::everywhere ? 1 : 0);
   b.set("u_error_bound", kSumOfBounds * s.tolerance);
 }
@@ -160,6 +163,7 @@ SceneBindings bind_scene(const DomainGeometry& geometry, const EncodedField& fie
   add_march(geometry, scene, b);
   add_transfer_function(geometry, stored, b);
   add_leaps(field, stored, leaps, b);
+  if (s.sampling == Sampling::planned) require_interpolation("sampling planned", field.definition.filter);
   add_plan(geometry, field, stored, b);
   add_clip_planes(geometry, s, b);
   add_ray_offset(s, b);

@@ -192,7 +192,7 @@ struct RenderSettings {
   Integrator integrator = Integrator::exponential_midpoint;
   Dispatch dispatch = Dispatch::fragment;  ///< consumer `raycast`
   double tolerance = 1e-3;          ///< error asked of every channel of a pixel; integrator `tolerance` alone
-  double budget = 1e-3;             ///< what the intervals of a ray may add to the error of a channel; sampling `planned` alone
+  double budget = 1e-2;             ///< what the intervals of a ray may add to the error of a channel; sampling `planned` alone
   double step = 1;                  ///< cell widths (smallest edge): of the finest level for lattice, of the region for adaptive
   int width = 512;                  ///< pixels
   int height = 512;                 ///< pixels
