@@ -206,9 +206,12 @@ TEST(Planned, IsRefusedWhereTheFieldJumpsOrItsVariationIsUnknown) {
   for_each_encoding([&](const EncodingCase& c) {
     EncodingCase nearest = c;
     nearest.filter = Filter::nearest;
-    if (accepted(h, nearest))
+    if (accepted(h, nearest)) {
       EXPECT_THAT(complaint(build_for(h, nearest, scene)), HasSubstr("sampling planned: the filter nearest jumps"));
-    if (interpolating(c)) EXPECT_THAT(complaint(build(h, c)), HasSubstr("built without how its field varies"));
+    }
+    if (interpolating(c)) {
+      EXPECT_THAT(complaint(build(h, c)), HasSubstr("built without how its field varies"));
+    }
   });
 }
 
