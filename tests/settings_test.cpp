@@ -126,7 +126,7 @@ const std::vector<Change>& changes() {
       {"mode", R"("mip")"},
       {"sampling", R"("lattice")"},
       {"step", "0.5"},
-      {"budget", "0.01", Mode::dvr, R"({"sampling": "planned"})"},
+      {"budget", "0.02", Mode::dvr, R"({"sampling": "planned"})"},
       {"tolerance", "0.01", Mode::dvr, R"({"integrator": "tolerance"})"},
       {"integrator", R"("euler")"},
       {"width", "9"},

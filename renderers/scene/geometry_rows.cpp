@@ -197,6 +197,7 @@ Rows top_rows() {
         .default_text = "none",
         .recorded = Recorded::never,
         .takes = {only_with("mode", {"dvr"}, "other modes draw one field"),
+                  only_with("sampling", {"lattice", "adaptive"}, "steps are planned for one field"),
                   only_with("integrator", {"exponential_midpoint", "euler", "left"},
                             "others know light between two values of one field"),
                   not_with("point_light", nullptr, "rays to the lamp of 'point_light' gather the depth of one field"),

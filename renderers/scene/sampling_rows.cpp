@@ -66,8 +66,7 @@ Rows sampling_rows() {
                    .column = {"sampling"},
                    .takes = {{"mode", {"dvr", "projection"}, Otherwise::refused, "others have no error that a step leaves", {"planned"}},
                              {"consumer", {"raycast"}, Otherwise::unsupported, "steps are planned along a whole ray", {"planned"}},
-                             {"integrator", {"exponential_midpoint"}, Otherwise::refused, "its errors are those that are planned", {"planned"}},
-                             {"transfer_functions", {Json::array()}, Otherwise::refused, "steps are planned for one field", {"planned"}}}},
+                             {"integrator", {"exponential_midpoint"}, Otherwise::refused, "its errors are those that are planned", {"planned"}}}},
                   [](const Scene& s) -> Json { return sampling_name(s.settings.sampling); },
                   [](Scene& s, const Json& v) { s.settings.sampling = parse_sampling(v.get<std::string>()); }});
   rows.push_back(
