@@ -18,11 +18,14 @@ int plan_code(IN(ivec3) cell) {
   return int((planned_steps[index >> 2] >> uint((index & 3) << 3)) & 255u);
 }
 
-// The step for `length` of a ray in a region, from `f` on (finest cells from its lower corner): that of the block in the middle.
-// Between blocks steps differ by no more than their distance.
+// The step for `length` of a ray in a region, from `f` on (finest cells from its lower corner): the shorter one of those where it
+// enters and where it leaves. Between blocks steps differ by no more than their distance. (That of the block in the middle alone saves
+// a look-up and costs 10 dB in regions larger than a block.)
 real planned_step(IN(Region) r, IN(vec3r) f, IN(vec3r) direction, IN(real) length) {
-  ivec3 middle = ivec3(max(f + direction * (length * real(0.5)), vec3r(0)));
-  int code = plan_code(min(r.lower + middle, r.upper - ivec3(1)));
+  ivec3 last = r.upper - r.lower - ivec3(1);
+  int enter = plan_code(r.lower + clamp(ivec3(floor(f)), ivec3(0), last));
+  int leave = plan_code(r.lower + clamp(ivec3(floor(f + direction * length)), ivec3(0), last));
+  int code = min(enter, leave);
   if (code == AMRTEX_PLAN_CONSTANT) return length;
   real width = real(r.width);
   return clamp(exp2(real(code) * real(0.125) - real(4)), AMRTEX_PLAN_LEAST * width, AMRTEX_PLAN_MOST * width);
