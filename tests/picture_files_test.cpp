@@ -30,6 +30,7 @@ std::vector<std::string> texts(const std::vector<Tick>& list) {
 TEST(Ticks, AreRoundNumbersInsideOfTheRange) {
   EXPECT_THAT(texts(ticks(0, 1, false, 6)), testing::ElementsAre("0", "0.2", "0.4", "0.6", "0.8", "1"));
   EXPECT_THAT(texts(ticks(-3.2, 9.9, false, 4)), testing::ElementsAre("0", "5"));
+  EXPECT_THAT(texts(ticks(-7.6, 7.6, false, 4)), testing::ElementsAre("-5", "0", "5"));
   EXPECT_THAT(texts(ticks(1e6, 1e6 + 4e-3, false, 5)),
               testing::ElementsAre("1000000", "1000000.001", "1000000.002", "1000000.003", "1000000.004"));
   EXPECT_THAT(texts(ticks(1e-31, 1e-28, true, 8)), testing::ElementsAre("1e-31", "1e-30", "1e-29", "1e-28"));

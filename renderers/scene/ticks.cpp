@@ -29,10 +29,16 @@ std::string number_text(double value, int digits) {
   return text;
 }
 
+/// Multiples of `step` in the range.
+double multiples(double lower, double upper, double step) {
+  return std::floor(upper / step + 1e-6) - std::ceil(lower / step - 1e-6) + 1;
+}
+
 std::vector<Tick> linear_ticks(double lower, double upper, int most) {
-  const double step = round_step((upper / 2 - lower / 2) / (most - 1) * 2);
+  double step = round_step((upper / 2 - lower / 2) / (most + 1) * 2);
   std::vector<Tick> list;
   if (!(step > 0) || !std::isfinite(step)) return list;
+  while (multiples(lower, upper, step) > most) step = round_step(1.5 * step);
   const double first = std::ceil(lower / step - 1e-6);
   const double largest = std::max(std::abs(lower), std::abs(upper));
   const int digits = std::clamp(1 + static_cast<int>(std::floor(std::log10(largest)) - std::floor(std::log10(step))), 1, 15);
