@@ -47,7 +47,7 @@ class Bundle(unittest.TestCase):
         (cls.prefix,) = cls.unpacked.iterdir()
         cls.libraries = cls.prefix / "lib/amrtex"
         files = [*cls.prefix.glob("bin/*"), *cls.libraries.iterdir()]
-        cls.binaries = [f for f in files if not f.is_symlink() and f.is_file() and f.read_bytes()[:4] == b"\x7fELF"]
+        cls.binaries = [f for f in files if not f.is_symlink() and f.read_bytes()[:4] == b"\x7fELF"]
 
     @classmethod
     def tearDownClass(cls):

@@ -64,9 +64,12 @@ const whenIdle = (then) => (window.requestIdleCallback ? requestIdleCallback(the
 async function drawWaiting() {
   const box = waitingPlots[0];
   const shown = shownPlots.find((one) => one.box === box);
-  if (shown && !box.dataset.drawn) await drawPlot(shown.box, shown.plot);
-  waitingPlots.shift();
-  if (waitingPlots.length > 0) whenIdle(drawWaiting);
+  try {
+    if (shown && !box.dataset.drawn) await drawPlot(shown.box, shown.plot);
+  } finally {  // one that cannot be drawn holds up no other
+    waitingPlots.shift();
+    if (waitingPlots.length > 0) whenIdle(drawWaiting);
+  }
 }
 
 const plotWatcher = new IntersectionObserver((entries) => {
