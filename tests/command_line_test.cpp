@@ -904,7 +904,7 @@ TEST_F(CommandLine, CompareAndMergeTakeWhatRunWrote) {
   EXPECT_EQ(itself.exit_code, 0) << itself.err;
   EXPECT_THAT(itself.out, AllOf(HasSubstr("3 points with times"), HasSubstr("n too small: 1 against 1 cannot decide 3 rows"),
                                 HasSubstr("0 exact values differ"), HasSubstr("that can decide 3 points: 5")));
-  EXPECT_EQ(json_of({"merge", all, out, "--json"}), Json({{"added", 3}, {"present", 0}, {"renumbered", 0}}));
+  EXPECT_EQ(json_of({"merge", all, out, "--json"}), Json({{"added", 3}, {"present", 0}, {"renumbered", 0}, {"pictures", 3}}));
   EXPECT_EQ(json_of({"merge", all, out, "--json"}).at("present"), 3);
   EXPECT_EQ(json_of({"compare", out, all, "--json"}).at("findings"), false);
   EXPECT_EQ(amrtex({"report", all}).exit_code, 0);

@@ -16,6 +16,7 @@
 #include "bench/records/merge_records.hpp"
 #include "bench/records/record.hpp"
 #include "bench/records/record_file.hpp"
+#include "bench/records/stored_picture.hpp"
 #include "bench/report/compare.hpp"
 #include "bench/report/repetitions.hpp"
 #include "bench/report/report.hpp"
@@ -766,6 +767,23 @@ TEST_F(Merging, LosesNoRepetition) {
   std::vector<int> repetitions;
   for (const Json& r : merged()) repetitions.push_back(r["repetition"]);
   EXPECT_THAT(repetitions, ElementsAre(0, 1, 2, 3));
+}
+
+TEST_F(Merging, TakesPicturesAlong) {
+  const std::string name = small(0, 1)["configuration"];
+  const fs::path a = written("a", {small(0, 1)}), b = written("b", {small(0, 2)}), c = written("c", {elsewhere(small(0, 3))});
+  Picture one(2, 1, 1), two(2, 1, 1);
+  one.values = {1, 3};
+  two.values = {5, 7};
+  for (const auto& [folder, picture] : {std::pair(b, one), std::pair(c, two)}) {
+    fs::create_directories(picture_folder(folder));
+    write_stored_picture(picture_path(folder, name), {picture, std::nullopt});
+    std::ofstream(picture_path(folder, name, ".png")) << "to look at";
+  }
+  EXPECT_EQ(merge({a, b, c}).pictures, 1u) << "a has none, b's is the first";
+  EXPECT_EQ(read_stored_picture(picture_path(at("out"), name)).picture.values, one.values);
+  EXPECT_TRUE(fs::exists(picture_path(at("out"), name, ".png")));
+  EXPECT_EQ(merge({a, b, c}).pictures, 0u) << "merging twice changes nothing";
 }
 
 TEST_F(Merging, RefusesPointsOfTwoPrograms) {

@@ -74,10 +74,10 @@ int merge(const Arguments& a) {
   print_warnings(merged.warnings);
   copy_table_choices(a.out, inputs);
   if (a.json)
-    fmt::print("{}\n", Json{{"added", merged.added}, {"present", merged.present}, {"renumbered", merged.renumbered}}.dump());
+    fmt::print("{}\n", Json{{"added", merged.added}, {"present", merged.present}, {"renumbered", merged.renumbered}, {"pictures", merged.pictures}}.dump());
   else
-    fmt::print("{}: {} records added, {} of them as further repetitions; {} were there\n", printable(a.out), merged.added,
-               merged.renumbered, merged.present);
+    fmt::print("{}: {} records added, {} of them as further repetitions; {} were there; pictures of {} points taken along\n",
+               printable(a.out), merged.added, merged.renumbered, merged.present, merged.pictures);
   return 0;
 }
 

@@ -99,7 +99,7 @@ Scene look_of(const Json& record) {
 
 void show_record(const PanelSpec& panel, PanelContent& content) {
   const Json record = find_record(panel);
-  const fs::path file = fs::path(panel.records) / "pictures" / (record.at("configuration").get<std::string>() + ".npz");
+  const fs::path file = picture_path(panel.records, record.at("configuration").get<std::string>());
   StoredPicture stored = read_stored_picture(file);
   const Scene look = look_of(record);
   if (panel.show == Show::error) {

@@ -198,12 +198,11 @@ Json PointMeasurer::measure_one(const BuildPoint& build, Built& built, const Ren
 
 /// One to look at, and one to compute with.
 void PointMeasurer::keep_picture(const std::string& name, const Picture& picture, const std::optional<Judgement>& own) const {
-  const fs::path folder = options_.folder / "pictures";
-  make_folder(folder);
-  write_png(picture, folder / (name + ".png"));
+  make_folder(picture_folder(options_.folder));
+  write_png(picture, picture_path(options_.folder, name, ".png"));
   StoredPicture stored{picture, std::nullopt};
   if (own) stored.difference = difference_of(picture, own->reference);
-  write_stored_picture(folder / (name + ".npz"), stored);
+  write_stored_picture(picture_path(options_.folder, name), stored);
 }
 
 void PointMeasurer::add_warnings(Json& record, const Scene& scene, const Consumer& consumer) const {

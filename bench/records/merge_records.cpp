@@ -3,13 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
+#include <iterator>
 #include <map>
 #include <utility>
 
 #include "bench/records/record.hpp"
 #include "bench/records/record_file.hpp"
+#include "bench/records/stored_picture.hpp"
 #include "structures/mesh/error.hpp"
 #include "structures/mesh/quoted.hpp"
+#include "structures/mesh/whole_file.hpp"
 
 namespace amrtex {
 namespace {
@@ -88,6 +92,27 @@ class Repetitions {
   std::map<PointKey, std::map<int, std::string>> points_;
 };
 
+std::string bytes_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  if (!file) throw Error(fmt::format("{}: cannot be read", path.string()));
+  return bytes;
+}
+
+/// The picture of a point, where the input has one and `out` has none; returns whether it took one.
+bool take_picture(const fs::path& out, const fs::path& input, const std::string& configuration) {
+  bool taken = false;
+  for (const char* extension : {".npz", ".png"}) {
+    const fs::path from = picture_path(input, configuration, extension), to = picture_path(out, configuration, extension);
+    std::error_code absent;
+    if (!fs::is_regular_file(from, absent) || fs::exists(to, absent)) continue;
+    make_folder(picture_folder(out));
+    write_atomically(to, bytes_of(from));
+    taken = true;
+  }
+  return taken;
+}
+
 }  // namespace
 
 MergedRecords merge_records(const fs::path& out, std::span<const fs::path> inputs) {
@@ -107,6 +132,8 @@ MergedRecords merge_records(const fs::path& out, std::span<const fs::path> input
   }
   for (const Input& input : read)
     for (Json record : input.records) {
+      // before its record, as `run` keeps them
+      if (take_picture(out, input.name, key_of(record).configuration)) ++merged.pictures;
       if (repetitions.holds(record)) {
         ++merged.present;
         continue;

@@ -82,6 +82,13 @@ Picture from_halves(const HalfPicture& half) {
   return picture;
 }
 
+std::filesystem::path picture_folder(const std::filesystem::path& records) { return records / "pictures"; }
+
+std::filesystem::path picture_path(const std::filesystem::path& records, const std::string& configuration,
+                                   const std::string& extension) {
+  return picture_folder(records) / (configuration + extension);
+}
+
 Picture difference_of(const Picture& picture, const Picture& reference) {
   assert(picture.values.size() == reference.values.size());
   Picture difference = picture;

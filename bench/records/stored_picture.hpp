@@ -29,6 +29,12 @@ struct StoredPicture {
   std::optional<Picture> difference;  ///< picture - reference, value by value
 };
 
+/// Folder of the pictures of a folder of records.
+std::filesystem::path picture_folder(const std::filesystem::path& records);
+/// Where in it a point's picture lies, as numbers (".npz") or to look at (".png").
+std::filesystem::path picture_path(const std::filesystem::path& records, const std::string& configuration,
+                                   const std::string& extension = ".npz");
+
 /// The signed difference of two pictures of one size.
 Picture difference_of(const Picture& picture, const Picture& reference);
 

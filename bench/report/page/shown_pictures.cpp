@@ -238,7 +238,7 @@ ShownPicture shown_picture(const StoredPicture& stored, int most) {
 std::optional<ShownPicture> PictureFolder::find(const Json& record, int most) {
   const std::string name = text_at(record, "/configuration");
   if (!is_hash(name)) return std::nullopt;
-  const std::filesystem::path own = folder_ / "pictures" / (name + ".npz");
+  const std::filesystem::path own = picture_path(folder_, name);
   std::error_code absent;
   if (std::filesystem::exists(own, absent)) return shown_picture(read_stored_picture(own), most);
   if (!small_) {
