@@ -65,20 +65,8 @@ class Programs:
 
     def build(self, name, turns=None):
         fault = FAULTS.get(name)
-        file = check_mutations.COPY / fault["file"] if fault else None
-        text = file.read_text(encoding="utf-8") if fault else ""
-        if fault:
-            if text.count(fault["before"]) != 1:
-                raise SystemExit(f"{fault['file']}: the place of the planted work stands {text.count(fault['before'])} times there")
-            file.write_text(text.replace(fault["before"], fault["after"].format(turns=turns)), encoding="utf-8")
-        try:
-            error = check_mutations.build(["amrtex"])
-        finally:
-            if fault:
-                file.write_text(text, encoding="utf-8")
-        if error:
-            raise SystemExit(error)
-        shutil.copy2(next(check_mutations.BUILD.rglob("amrtex")), self.path(name))
+        change = {**fault, "name": name, "after": fault["after"].format(turns=turns)} if fault else None
+        check_mutations.build_program(self.path(name), change)
 
 
 class Folder:

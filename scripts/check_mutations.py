@@ -8,6 +8,7 @@ not noticed.
 """
 
 import argparse
+import contextlib
 import hashlib
 import json
 import os
@@ -102,16 +103,32 @@ def who_notices():
     return None, []
 
 
-def try_mutation(mutation):
-    file = COPY / mutation["file"]
+@contextlib.contextmanager
+def planted(change):
+    """The copy with `after` in place of `before` in a `file`, as long as the block lasts."""
+    file = COPY / change["file"]
     text = file.read_text(encoding="utf-8")
-    if text.count(mutation["before"]) != 1:
-        raise SystemExit(f"{mutation['name']}: its line stands {text.count(mutation['before'])} times in {mutation['file']}; once is accepted")
-    file.write_text(text.replace(mutation["before"], mutation["after"]), encoding="utf-8")
+    if text.count(change["before"]) != 1:
+        raise SystemExit(f"{change['name']}: its line stands {text.count(change['before'])} times in {change['file']}; once is accepted")
+    file.write_text(text.replace(change["before"], change["after"]), encoding="utf-8")
     try:
-        suite, failed = who_notices()
+        yield
     finally:
         file.write_text(text, encoding="utf-8")
+
+
+def build_program(path, change=None):
+    """`amrtex` of the copy, with a change or as it is, at `path`."""
+    with planted(change) if change else contextlib.nullcontext():
+        error = build(["amrtex"])
+    if error:
+        raise SystemExit(error)
+    shutil.copy2(next(BUILD.rglob("amrtex")), path)
+
+
+def try_mutation(mutation):
+    with planted(mutation):
+        suite, failed = who_notices()
     return {"noticed_by": suite, "cases": len(failed), "first": failed[0] if failed else ""}
 
 

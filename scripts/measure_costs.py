@@ -15,7 +15,6 @@ import itertools
 import json
 import pathlib
 import random
-import shutil
 import subprocess
 import sys
 import time
@@ -91,18 +90,8 @@ def measured(program, experiment, folder):
 def build_floor(path):
     """The program that draws without a fetch, from a copy of the tree. Stencils of the octree are fetched all the same."""
     check_mutations.refresh_copy()
-    file = check_mutations.COPY / "shaders/contract.glsl"
-    text = file.read_text(encoding="utf-8")
-    if text.count(FIELD) != 1:
-        raise SystemExit(f"{file}: fetch_field stands {text.count(FIELD)} times there")
-    file.write_text(text.replace(FIELD, MADE_UP), encoding="utf-8")
-    try:
-        error = check_mutations.build(["amrtex"])
-    finally:
-        file.write_text(text, encoding="utf-8")
-    if error:
-        raise SystemExit(error)
-    shutil.copy2(next(check_mutations.BUILD.rglob("amrtex")), path)
+    change = {"name": "without fetches", "file": "shaders/contract.glsl", "before": FIELD, "after": MADE_UP}
+    check_mutations.build_program(path, change)
 
 
 def reading_milliseconds(size, cores):
