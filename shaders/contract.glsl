@@ -24,6 +24,9 @@ DEFINE_INT(AMRTEX_LEVEL_OF_DETAIL)     // 1 where refined cells may be drawn in 
 // the same number as kMostFields (asserted in renderers/cpu/cpu_field.cpp.in)
 #define AMRTEX_MOST_FIELDS 4
 
+// the same number as kMostPoolTextures (asserted there as well): textures that a field's pool may be divided over
+#define AMRTEX_MOST_POOL_TEXTURES 8
+
 #define AMRTEX_NO_RANGE 0xffffffffu  // coded range of a region without mesh
 
 STRUCT Position {

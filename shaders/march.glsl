@@ -1,5 +1,6 @@
 // The one integration loop: raycaster, CPU renderer and later consumers share it.
 #include "sample.glsl"
+#include "block_maps.glsl"
 #include "leap.glsl"
 #include "plan.glsl"
 #include "lattice.glsl"

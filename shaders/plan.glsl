@@ -2,20 +2,18 @@
 // the transfer function (renderers/bindings/plan_bindings.cpp).
 DEFINE_INT(AMRTEX_PLANNED)  // 1 where steps are planned, else 0
 
-#define AMRTEX_PLAN_CONSTANT 255   // code of a block in which one interval is exact, however long
 #define AMRTEX_PLAN_LEAST real(0.125)  // cell widths of a region
 #define AMRTEX_PLAN_MOST real(8)       // cell widths of a region
 
 #if AMRTEX_CPP || AMRTEX_PLANNED
-BUFFER(uint, planned_steps, planned_steps_block)  // codes of four blocks a word, x fastest, lowest byte first
+BUFFER(uint, planned_steps, planned_steps_block)  // codes, laid out in block_maps.h
 UNIFORM(ivec3, u_plan_blocks)  // along each axis
 UNIFORM(int, u_plan_shift)     // log2 of a block's edge, finest cells
 
-// The code of the block that holds a finest cell: the step is 2^(code / 8 - 4) units of ray length.
+// The code of the block that holds a finest cell.
 int plan_code(IN(ivec3) cell) {
-  ivec3 block = cell >> u_plan_shift;
-  int index = block.x + u_plan_blocks.x * (block.y + u_plan_blocks.y * block.z);
-  return int((planned_steps[index >> 2] >> uint((index & 3) << 3)) & 255u);
+  uint index = block_index(cell >> u_plan_shift, u_plan_blocks);
+  return byte_of(planned_steps[index / AMRTEX_BYTES_IN_WORD], index);
 }
 
 // The step for `length` of a ray in a region, from `f` on (finest cells from its lower corner): the shorter one of those where it
@@ -28,7 +26,7 @@ real planned_step(IN(Region) r, IN(vec3r) f, IN(vec3r) direction, IN(real) lengt
   int code = min(enter, leave);
   if (code == AMRTEX_PLAN_CONSTANT) return length;
   real width = real(r.width);
-  return clamp(exp2(real(code) * real(0.125) - real(4)), AMRTEX_PLAN_LEAST * width, AMRTEX_PLAN_MOST * width);
+  return clamp(exp2(real(code) / real(AMRTEX_PLAN_CODES_AN_OCTAVE) - real(AMRTEX_PLAN_OCTAVES_BELOW_ONE)), AMRTEX_PLAN_LEAST * width, AMRTEX_PLAN_MOST * width);
 }
 #else
 real planned_step(IN(Region) r, IN(vec3r) f, IN(vec3r) direction, IN(real) length) { return length; }

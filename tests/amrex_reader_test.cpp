@@ -692,6 +692,32 @@ TEST_F(AmrexReader, ReadsBackWhatItWrites) {
   expect_same_mesh(missing, AmrHierarchy(read_mesh(folder_ / "missing_copy")));
 }
 
+// Four bytes a value, in the file as in memory.
+TEST_F(AmrexReader, WritesSinglePrecisionAsSinglePrecision) {
+  MeshDescription mesh = read_mesh(write_plotfile(folder_ / "plt", two_levels()));
+  const AmrHierarchy wide(mesh);
+  for (std::vector<Patch>& level : mesh.levels)
+    for (Patch& patch : level)
+      for (CellValues& values : patch.values) {
+        CellValues narrow(RealType::float32, values.size());
+        for (std::size_t i = 0; i < values.size(); ++i) narrow.set(i, values[i]);
+        values = std::move(narrow);
+      }
+  const AmrHierarchy narrow(std::move(mesh));
+  write_amrex_plotfile(wide, folder_ / "wide");
+  write_amrex_plotfile(narrow, folder_ / "narrow");
+  const MeshDescription read = read_mesh(folder_ / "narrow");
+  EXPECT_EQ(read.levels[1][0].values[0].type(), RealType::float32);
+  expect_same_mesh(narrow, AmrHierarchy(read));
+  for (const char* level : {"Level_0", "Level_1"}) {
+    const auto patches = static_cast<std::int64_t>(wide.patches(level[6] - '0').size());
+    const std::int64_t saved = static_cast<std::int64_t>(fs::file_size(folder_ / "wide" / level / "Cell_D_00000")) -
+                               static_cast<std::int64_t>(fs::file_size(folder_ / "narrow" / level / "Cell_D_00000"));
+    const std::int64_t values = wide.stored_cells(level[6] - '0') * std::ssize(wide.fields());
+    EXPECT_EQ(saved, 4 * values + 11 * patches) << "a header that says float32 has eleven letters less";
+  }
+}
+
 TEST_F(AmrexReader, LeavesNothingBehindWhenWritingFails) {
   const AmrHierarchy mesh(read_mesh(write_plotfile(folder_ / "plt", two_levels())));
   fs::create_directory(folder_ / "taken");

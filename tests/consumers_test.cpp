@@ -458,5 +458,29 @@ TEST(BoxConsumers, RefuseByNameWhatTheyCannotDraw) {
   EXPECT_EQ(refusal(scene), "drawn");
 }
 
+// ---- memory of the host ----
+
+TEST(HostArrays, AreGivenBackOnceTheContextHoldsThem) {
+  const AmrHierarchy h = holes_and_missing(waves).hierarchy();
+  Context& gl = context(ContextKind::egl);
+  Scene scene = small_scene(Mode::dvr, perspective({1.9, 2.3, 1.7}, Vec3d(0.5)), Sampling::adaptive, 8);
+  scene.transfer_function = peaks();
+  const auto drawn = [&](const Structure& structure) {
+    Raycaster raycaster(gl, h, structure, scene);
+    raycaster.draw();
+    return raycaster.read().values;
+  };
+  for_each_encoding([&](const EncodingCase& c) {
+    const EncodedField field = build(h, c);
+    const Structure kept(gl, field);
+    const Structure given(gl, field, {}, HostArrays::give_back);
+    for (const HostTexture& t : kept.field.textures) EXPECT_FALSE(t.data.empty()) << t.name;
+    for (const HostTexture& t : given.field.textures) EXPECT_EQ(t.data.capacity(), 0) << t.name;
+    EXPECT_EQ(given.field.memory(), field.memory());
+    EXPECT_EQ(given.gpu.bytes(), field.memory().total());
+    EXPECT_EQ(drawn(given), drawn(kept));
+  });
+}
+
 }  // namespace
 }  // namespace amrtex

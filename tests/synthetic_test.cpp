@@ -10,9 +10,11 @@
 #include <cstring>
 #include <map>
 #include <numbers>
+#include <random>
 #include <set>
 #include <utility>
 
+#include "structures/generators/analytic_fields.hpp"
 #include "structures/generators/cluster_blocks.hpp"
 #include "structures/generators/random_mesh.hpp"
 
@@ -376,6 +378,31 @@ TEST(Refine, GradientFollowsTheDifferenceOverOneCell) {
   EXPECT_TRUE(mesh.patches(3).empty());
 }
 
+// The largest gradient of 4000 places of a box is never above the bound, and within a factor of 5 of it in boxes that are small beside
+// what the field changes over: a bound that is always infinite would leave nothing out.
+TEST(Refine, TheSteepestOfABoxIsABound) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  const auto vector = [&] { return Vec3d(uniform(random), uniform(random), uniform(random)); };
+  for (const char* text : {R"({"field": "blobs"})", R"({"field": "shell"})", R"({"field": {"type": "shell", "lobes": 3, "width": 0.05}})",
+                           R"({"field": "blobs_shell"})"}) {
+    const auto field = make_analytic_field(parse(text));
+    int tight = 0;
+    for (int i = 0; i < 60; ++i) {
+      const double edge = std::exp2(-1 - 6 * uniform(random));
+      const Vec3d lower = vector() * (1 - edge);
+      const WorldBox box{lower, lower + Vec3d(edge)};
+      const double bound = field->steepest_in(box);
+      double largest = 0;
+      for (int k = 0; k < 4000; ++k) largest = std::max(largest, glm::length(field->gradient(box.at(vector()))));
+      EXPECT_LE(largest, bound * (1 + 1e-12)) << text << " edge " << edge;
+      tight += bound <= 5 * largest ? 1 : 0;
+    }
+    EXPECT_GT(tight, 10) << text;
+  }
+  EXPECT_TRUE(std::isinf(make_analytic_field(parse(R"({"field": "oscillating"})"))->steepest_in({})));
+}
+
 TEST(Refine, ValueSelectsBothSigns) {
   const AmrHierarchy mesh = make_hierarchy(parse(R"({"field": {"type": "linear", "gradient": [1, 0, 0]}, "levels": 2, "root": 16,
       "patch": 4, "domain": {"lower": [-1, 0, 0], "upper": [1, 1, 1]}, "refine": {"criterion": "value", "threshold": 0.75}})"));
@@ -508,6 +535,30 @@ TEST(MissingValues, TakeTheirFractionOfLeafCells) {
   for (const double value : all.levels[0][0].values[0]) EXPECT_TRUE(std::isnan(value));
 }
 
+TEST(Precision, SingleIsTheDoubleMeshWithItsValuesRounded) {
+  Json specification = parse(R"({"field": "blobs", "levels": 2, "root": 16, "patch": 8, "nan_fraction": 0.1})");
+  const MeshDescription wide = generate_mesh(specification);
+  specification["precision"] = "single";
+  const MeshDescription narrow = generate_mesh(specification);
+  ASSERT_EQ(narrow.levels.size(), wide.levels.size());
+  for (std::size_t l = 0; l < wide.levels.size(); ++l) {
+    ASSERT_EQ(narrow.levels[l].size(), wide.levels[l].size());
+    for (std::size_t p = 0; p < wide.levels[l].size(); ++p) {
+      const CellValues& rounded = narrow.levels[l][p].values[0];
+      const CellValues& values = wide.levels[l][p].values[0];
+      EXPECT_EQ(rounded.type(), RealType::float32);
+      EXPECT_EQ(values.type(), RealType::float64);
+      ASSERT_EQ(rounded.size(), values.size());
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        if (std::isnan(values[i]))
+          EXPECT_TRUE(std::isnan(rounded[i]));
+        else
+          EXPECT_EQ(rounded[i], static_cast<double>(static_cast<float>(values[i])));
+      }
+    }
+  }
+}
+
 // ---------------------------------------------------------------- bad specifications
 
 struct BadSpecification {
@@ -583,6 +634,7 @@ TEST(BadSpecification, IsAUsageErrorThatNamesKeyValueAndWhatIsAccepted) {
       {R"({"efficiency": 0.5, "body": {"field": "blobs", "above": 1}})", {"\"efficiency\"", "0.5", "body"}},
       {R"({"nan_fraction": -0.1})", {"\"nan_fraction\"", "-0.1", "from 0 to 1"}},
       {R"({"averaged": 1})", {"\"averaged\"", "1", "true or false"}},
+      {R"({"precision": "half"})", {"\"precision\"", "\"half\"", "double, single"}},
       {R"({"seed": -1})", {"\"seed\"", "-1", "an integer from 0"}},
       {R"({"seed": 18446744073709551615})", {"\"seed\"", "18446744073709551615", "an integer from 0"}},
       {R"({"root": 1024, "levels": 3, "refine": {"criterion": "random", "fraction": 1}})", {"cells", "at most 2147483648"}}};

@@ -212,7 +212,7 @@ void draw(const Arguments& a, const Drawn& d, const Scene& drawn, Context& conte
     write_picture(a, HierarchyReference(d.mesh, 0, field.definition).render(drawn, reference_rule(d.scene, a.reference_step, a.reference_tolerance)), drawn, d.mesh);
     return;
   }
-  const Structure structure(context, std::move(field), request);
+  const Structure structure(context, std::move(field), request, a.explain_error ? HostArrays::keep : HostArrays::give_back);
   const auto consumer = make_consumer(context, d.mesh, structure, drawn);
   const Heat heat = a.heat.empty() ? Heat::error : parse_heat(a.heat);
   if (heat != Heat::error) {

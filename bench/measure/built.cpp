@@ -24,7 +24,7 @@ std::unique_ptr<Built> build_structure(const Experiment& experiment, const Build
   EncodedField field = encoding.build(mesh, request);
   const double build_seconds = building.seconds();
   const Stopwatch uploading;
-  auto built = std::make_unique<Built>(Built{Structure(context, std::move(field), request), build_seconds, 0});
+  auto built = std::make_unique<Built>(Built{Structure(context, std::move(field), request, experiment.explain_error ? HostArrays::keep : HostArrays::give_back), build_seconds, 0});
   context.gl().Finish();
   built->upload_seconds = uploading.seconds();
   return built;

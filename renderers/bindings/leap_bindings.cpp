@@ -6,12 +6,15 @@
 #include <array>
 #include <bit>
 
+#include "renderers/bindings/block_map.hpp"
 #include "renderers/bindings/distance_map.hpp"
 #include "renderers/bindings/transfer_bindings.hpp"
-#include "structures/common/build_tools.hpp"
 
 namespace amrtex {
 namespace {
+
+static_assert(static_cast<int>(Leap::off) == AMRTEX_LEAPS_NONE && static_cast<int>(Leap::cube) == AMRTEX_LEAPS_CUBE &&
+              static_cast<int>(Leap::octant) == AMRTEX_LEAPS_OCTANT);
 
 float as_float(double v) { return static_cast<float>(v); }
 
@@ -46,7 +49,6 @@ class Hides {
   std::vector<std::array<float, 2>> hidden_;
 };
 
-/// Four distances a word.
 std::vector<std::uint8_t> octants(const Vec3i& blocks, const std::vector<std::uint8_t>& seen) {
   std::vector<std::uint8_t> all(8 * seen.size());
   tbb::parallel_for(0, 8, [&](int octant) {
@@ -54,13 +56,6 @@ std::vector<std::uint8_t> octants(const Vec3i& blocks, const std::vector<std::ui
     std::copy(one.begin(), one.end(), all.begin() + octant * std::ssize(seen));
   });
   return all;
-}
-
-HostTexture packed(const std::vector<std::uint8_t>& distances) {
-  HostTexture buffer = make_buffer("leap_distances", TexelFormat::r32ui, static_cast<std::int64_t>((distances.size() + 3) / 4));
-  auto* words = buffer.as<std::uint32_t>();
-  for (std::size_t i = 0; i < distances.size(); ++i) words[i / 4] |= static_cast<std::uint32_t>(distances[i]) << (8 * (i % 4));
-  return buffer;
 }
 
 }  // namespace
@@ -78,7 +73,8 @@ void add_leaps(const EncodedField& field, const Scene& stored, LeapMap map, Scen
   b.define("AMRTEX_LEAPS", has_map ? static_cast<int>(stored.settings.leap) : 0);
   if (!has_map) return;
   const Vec3i& blocks = field.leaps.blocks;
-  b.buffers.push_back(packed(stored.settings.leap == Leap::octant ? octants(blocks, seen) : chessboard_distances(blocks, seen)));
+  b.buffers.push_back(
+      block_map("leap_distances", stored.settings.leap == Leap::octant ? octants(blocks, seen) : chessboard_distances(blocks, seen)));
   b.uniforms.push_back({"u_leap_blocks", std::vector<int>{blocks.x, blocks.y, blocks.z}});
   b.set("u_leap_shift", field.leaps.shift);
 }

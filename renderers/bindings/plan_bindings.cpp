@@ -10,8 +10,8 @@
 #include <limits>
 #include <optional>
 
+#include "renderers/bindings/block_map.hpp"
 #include "renderers/bindings/transfer_bindings.hpp"
-#include "structures/common/build_tools.hpp"
 #include "structures/mesh/error.hpp"
 
 namespace amrtex {
@@ -146,16 +146,11 @@ std::vector<double> steps_of(const std::vector<double>& densities, double block_
   return steps;
 }
 
-constexpr int kConstant = 255;  // as AMRTEX_PLAN_CONSTANT in shaders/plan.glsl
-
-HostTexture packed(const std::vector<double>& steps) {
-  HostTexture buffer = make_buffer("planned_steps", TexelFormat::r32ui, static_cast<std::int64_t>((steps.size() + 3) / 4));
-  auto* words = buffer.as<std::uint32_t>();
-  for (std::size_t i = 0; i < steps.size(); ++i) {
-    const double code = std::isinf(steps[i]) ? kConstant : std::clamp(std::floor(8 * (std::log2(steps[i]) + 4)), 0.0, kConstant - 1.0);
-    words[i / 4] |= static_cast<std::uint32_t>(code) << (8 * (i % 4));
-  }
-  return buffer;
+/// As planned_step() in shaders/plan.glsl reads it; a step between two codes is the shorter one.
+std::uint8_t code_of(double step) {
+  if (std::isinf(step)) return AMRTEX_PLAN_CONSTANT;
+  const double code = std::floor(AMRTEX_PLAN_CODES_AN_OCTAVE * (std::log2(step) + AMRTEX_PLAN_OCTAVES_BELOW_ONE));
+  return static_cast<std::uint8_t>(std::clamp(code, 0.0, AMRTEX_PLAN_CONSTANT - 1.0));
 }
 
 /// Neighbours along one axis, there and back.
@@ -190,7 +185,9 @@ void add_plan(const DomainGeometry& geometry, const EncodedField& field, const S
   const double edge = std::exp2(grid.shift);
   std::vector<double> steps = steps_of(densities(geometry, field, stored), edge * edge * edge, total_budget(geometry, field, stored));
   smooth_steps(grid.blocks, edge, steps);
-  b.buffers.push_back(packed(steps));
+  std::vector<std::uint8_t> codes(steps.size());
+  std::transform(steps.begin(), steps.end(), codes.begin(), code_of);
+  b.buffers.push_back(block_map("planned_steps", codes));
   b.uniforms.push_back({"u_plan_blocks", std::vector<int>{grid.blocks.x, grid.blocks.y, grid.blocks.z}});
   b.set("u_plan_shift", grid.shift);
 }

@@ -151,22 +151,13 @@ std::int64_t reported_texture_bytes(const GladGLContext& gl, GLuint id) {
 
 }  // namespace
 
-GpuField::GpuField(const EncodedField& field, Context& context)
+GpuField::GpuField(const EncodedField& field, Context& context, const std::function<void(std::size_t)>& uploaded)
     : context_(&context), encoding_(field.encoding), integer_uniforms_(field.integer_uniforms) {
   context.make_current();
   try {
     check_field(field, context);
     check_memory(field, context);
-    const Handles handles = upload_set(field);
-    for (const HostTexture& host : field.textures) {
-      if (has_handle(host)) continue;
-      if (host.kind != HostTexture::Kind::buffer) {
-        textures_.push_back({host.name, upload_texture(host)});
-        continue;
-      }
-      const auto words = handles.find(host.name);
-      upload_buffer(host, words == handles.end() ? host.data.data() : reinterpret_cast<const std::byte*>(words->second.data()));
-    }
+    upload_all(field, uploaded);
   } catch (const UnsupportedError& e) {
     throw UnsupportedError(fmt::format("encoding {}: {}", encoding_, e.what()));
   } catch (const BudgetError& e) {
@@ -179,18 +170,31 @@ GpuField::GpuField(const EncodedField& field, Context& context)
         fmt::format("encoding {}: {} bytes were allocated, its ledger has {}", encoding_, bytes_, field.memory().total()));
 }
 
-GpuField::Handles GpuField::upload_set(const EncodedField& field) {
+/// Textures first: their handles stand in buffers.
+void GpuField::upload_all(const EncodedField& field, const std::function<void(std::size_t)>& uploaded) {
   Handles handles;
   resident_ = ResidentTextures(*context_, std::count_if(field.textures.begin(), field.textures.end(), has_handle));
-  for (const HostTexture& host : field.textures) {
-    if (!has_handle(host)) continue;
-    const std::uint64_t handle = resident_.add(upload_texture(host));
-    std::vector<std::uint32_t>& words = handles[host.handles];
-    words.resize(2 * static_cast<std::size_t>(field.find(host.handles)->texels()));
-    words[2 * static_cast<std::size_t>(host.handle_index)] = static_cast<std::uint32_t>(handle);
-    words[2 * static_cast<std::size_t>(host.handle_index) + 1] = static_cast<std::uint32_t>(handle >> 32);
-  }
-  return handles;
+  for (const bool buffers : {false, true})
+    for (std::size_t i = 0; i < field.textures.size(); ++i) {
+      const HostTexture& host = field.textures[i];
+      if ((host.kind == HostTexture::Kind::buffer) != buffers) continue;
+      const auto words = handles.find(host.name);
+      if (has_handle(host))
+        upload_handle(field, host, handles);
+      else if (!buffers)
+        textures_.push_back({host.name, upload_texture(host)});
+      else
+        upload_buffer(host, words == handles.end() ? host.data.data() : reinterpret_cast<const std::byte*>(words->second.data()));
+      if (uploaded) uploaded(i);
+    }
+}
+
+void GpuField::upload_handle(const EncodedField& field, const HostTexture& host, Handles& handles) {
+  const std::uint64_t handle = resident_.add(upload_texture(host));
+  std::vector<std::uint32_t>& words = handles[host.handles];
+  words.resize(2 * static_cast<std::size_t>(field.find(host.handles)->texels()));
+  words[2 * static_cast<std::size_t>(host.handle_index)] = static_cast<std::uint32_t>(handle);
+  words[2 * static_cast<std::size_t>(host.handle_index) + 1] = static_cast<std::uint32_t>(handle >> 32);
 }
 
 GlTexture GpuField::upload_texture(const HostTexture& host) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -19,7 +20,8 @@ class GpuField {
  public:
   /// Throws UnsupportedError with the numbers, before anything is allocated, where a
   /// limit of the context would be passed; Error where the host data contradicts itself.
-  GpuField(const EncodedField& field, Context& context);
+  /// `uploaded`: called with the number of each texture or buffer of the field once the context holds it.
+  GpuField(const EncodedField& field, Context& context, const std::function<void(std::size_t)>& uploaded = {});
 
   /// Binds everything that the program uses and sets the field's uniforms. The consumer
   /// binds its own textures and buffers first, each time: throws Error naming what the
@@ -47,7 +49,8 @@ class GpuField {
   };
 
   GlTexture upload_texture(const HostTexture& host);
-  Handles upload_set(const EncodedField& field);
+  void upload_all(const EncodedField& field, const std::function<void(std::size_t)>& uploaded);
+  void upload_handle(const EncodedField& field, const HostTexture& host, Handles& handles);
   void upload_buffer(const HostTexture& host, const std::byte* data);
 
   Context* context_;

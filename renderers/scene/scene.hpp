@@ -83,7 +83,7 @@ enum class Mode { dvr, projection, mip, iso, dvr_iso };
 /// Samples at equal distances along a ray; at distances of the region's own cells; or at distances of which the host says for each
 /// place how far a budget lets them be apart.
 enum class Sampling { lattice, adaptive, planned };
-/// How rays pass what is hidden (the same numbers as AMRTEX_LEAPS_... in shaders/leap.glsl): region by region, by one map of
+/// How rays pass what is hidden (the numbers of AMRTEX_LEAPS_... in shaders/block_maps.h): region by region, by one map of
 /// distances, or by one for each octant of directions.
 enum class Leap { off, cube, octant };
 /// Who draws: the raycaster in one pass, or one of those that draw the field's boxes one by one (box_consumer.hpp).

@@ -37,6 +37,15 @@ class TrilinearField final : public AnalyticField {
   std::vector<double> c_;
 };
 
+double nearest(const WorldBox& box, const Vec3d& p) { return glm::distance(glm::clamp(p, box.lower, box.upper), p); }
+double farthest(const WorldBox& box, const Vec3d& p) { return glm::length(glm::max(glm::abs(box.lower - p), glm::abs(box.upper - p))); }
+
+/// Largest of q exp(-q^2 / 2) for q from `from` to `to`, both 0 or more: it rises up to 1 and falls beyond.
+double steepest(double from, double to) {
+  const double q = std::clamp(1.0, from, to);
+  return q * std::exp(-q * q / 2);
+}
+
 struct Blob {
   Vec3d center;      ///< world
   double sigma;      ///< standard deviation, world length
@@ -55,6 +64,12 @@ class BlobsField final : public AnalyticField {
   Vec3d gradient(const Vec3d& p) const override {
     Vec3d sum(0);
     for (const Blob& b : blobs_) sum -= term(b, p - b.center) / (b.sigma * b.sigma) * (p - b.center);
+    return sum;
+  }
+  double steepest_in(const WorldBox& box) const override {
+    double sum = 0;
+    for (const Blob& b : blobs_)
+      sum += std::abs(b.amplitude) / b.sigma * steepest(nearest(box, b.center) / b.sigma, farthest(box, b.center) / b.sigma);
     return sum;
   }
 
@@ -90,6 +105,15 @@ class ShellField final : public AnalyticField {
     if (vanishes(r) || r == 0) return Vec3d(0);
     const double slope = -(r - s_.radius) / (s_.width * s_.width);
     return s_.amplitude * profile(r) * (brightness_gradient(d, r) + brightness(d, r) * slope / r * d);
+  }
+  double steepest_in(const WorldBox& box) const override {
+    const double low = nearest(box, s_.center), high = farthest(box, s_.center);
+    const double from = low <= s_.radius && s_.radius <= high ? 0 : std::min(std::abs(low - s_.radius), std::abs(high - s_.radius)) / s_.width;
+    const double to = std::max(std::abs(low - s_.radius), std::abs(high - s_.radius)) / s_.width;
+    // around the axis the brightness changes by at most lobes / r, towards it by 1 / r; half of both
+    const double brightest = std::exp(-from * from / 2);
+    const double across = s_.lobes == 0 || brightest == 0 ? 0 : 0.5 * (s_.lobes + 1) / low * brightest;
+    return std::abs(s_.amplitude) * (steepest(from, to) / s_.width + across);
   }
 
  private:
@@ -174,6 +198,11 @@ class SumField final : public AnalyticField {
   Vec3d gradient(const Vec3d& p) const override {
     Vec3d sum(0);
     for (const FieldPointer& term : terms_) sum += term->gradient(p);
+    return sum;
+  }
+  double steepest_in(const WorldBox& box) const override {
+    double sum = 0;
+    for (const FieldPointer& term : terms_) sum += term->steepest_in(box);
     return sum;
   }
 

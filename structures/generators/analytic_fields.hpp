@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 #include <memory>
 #include <string>
 
@@ -11,18 +12,7 @@
 
 namespace amrtex {
 
-/// An analytic scalar field over world space.
-class AnalyticField {
- public:
-  virtual ~AnalyticField() = default;
-  virtual double value(const Vec3d& p_world) const = 0;
-  virtual Vec3d gradient(const Vec3d& p_world) const = 0;  ///< per world length
-};
-
-/// Builds the analytic field of a generator specification.
-std::unique_ptr<AnalyticField> make_analytic_field(const Json& specification);
-
-/// The domain in world space.
+/// The domain in world space, or a part of it.
 struct WorldBox {
   Vec3d lower{0};
   Vec3d upper{1};
@@ -34,6 +24,19 @@ struct WorldBox {
   /// The shortest edge, world: what default lengths are relative to.
   double edge() const { return std::min({extent().x, extent().y, extent().z}); }
 };
+
+/// An analytic scalar field over world space.
+class AnalyticField {
+ public:
+  virtual ~AnalyticField() = default;
+  virtual double value(const Vec3d& p_world) const = 0;
+  virtual Vec3d gradient(const Vec3d& p_world) const = 0;  ///< per world length
+  /// At least the gradient's length everywhere in a box (world), per world length; infinite where nobody knows.
+  virtual double steepest_in(const WorldBox& /*box*/) const { return std::numeric_limits<double>::infinity(); }
+};
+
+/// Builds the analytic field of a generator specification.
+std::unique_ptr<AnalyticField> make_analytic_field(const Json& specification);
 
 /// Reads the key `domain`.
 WorldBox read_domain(SpecReader& specification);

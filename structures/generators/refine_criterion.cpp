@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -25,18 +26,24 @@ struct Stencil {
 };
 
 struct GradientScore {
+  /// At least the score of all samples of cells whose stencils lie in `box`; `cell`: their edges. Both world.
+  static double most(const AnalyticField& field, const WorldBox& box, const Vec3d& cell) {
+    return field.steepest_in(box) * std::max({cell.x, cell.y, cell.z});
+  }
   double operator()(const Stencil& s) const {
     return std::max({std::abs(s.x[1] - s.x[0]), std::abs(s.y[1] - s.y[0]), std::abs(s.z[1] - s.z[0])});
   }
 };
 
 struct MagnitudeScore {
+  static double most(const AnalyticField&, const WorldBox&, const Vec3d&) { return std::numeric_limits<double>::infinity(); }
   double operator()(const Stencil& s) const { return std::abs(s.center); }
 };
 
 /// 1 where the field crosses the isovalue between two samples of the stencil, else 0.
 struct SurfaceScore {
   double isovalue;
+  static double most(const AnalyticField&, const WorldBox&, const Vec3d&) { return 1; }
   double operator()(const Stencil& s) const {
     const auto [low, high] = std::minmax({s.center, s.x[0], s.x[1], s.y[0], s.y[1], s.z[0], s.z[1]});
     return low <= isovalue && high > isovalue ? 1 : 0;
@@ -93,22 +100,35 @@ class SampledCriterion final : public RefineCriterion {
       : grid_(grid), domain_(domain), field_(field), threshold_(threshold), score_(score) {}
 
   void mark(int level, const Box& children, std::span<std::uint8_t> flags) const override {
-    const int unit = grid_.patch / grid_.ratio_between(level, level + 1);  // cells
-    const Box cells = intersection({children.lower * unit, children.upper * unit}, grid_.domain(level));
-    SampleWindow window(field_, domain_, cells, grid_.cells(level));
-    for (int z = -1; z <= window.size().z; ++z) {
-      window.load(z);
-      if (z >= 1) mark_plane(window, z - 1, unit, children, flags);
-    }
+    for_each_cell(children, [&](const Vec3i& child) { flags[children.offset(child)] = passes(level, child) ? 1 : 0; });
   }
 
  private:
-  void mark_plane(SampleWindow& window, int z, int unit, const Box& children, std::span<std::uint8_t> flags) const {
+  bool passes(int level, const Vec3i& child) const {
+    const int unit = grid_.patch / grid_.ratio_between(level, level + 1);  // cells
+    const Box cells = intersection({child * unit, (child + Vec3i(1)) * unit}, grid_.domain(level));
+    if (surely_below(level, cells)) return false;
+    SampleWindow window(field_, domain_, cells, grid_.cells(level));
+    for (int z = -1; z <= window.size().z; ++z) {
+      window.load(z);
+      if (z >= 1 && plane_passes(window, z - 1)) return true;
+    }
+    return false;
+  }
+
+  bool plane_passes(SampleWindow& window, int z) const {
     for (int y = 0; y < window.size().y; ++y)
-      for (int x = 0; x < window.size().x; ++x) {
-        const Vec3i child = children.lower + Vec3i(x, y, z) / (2 * unit);
-        if (score_(window.stencil(x, y, z)) > threshold_) flags[children.offset(child)] = 1;
-      }
+      for (int x = 0; x < window.size().x; ++x)
+        if (score_(window.stencil(x, y, z)) > threshold_) return true;
+    return false;
+  }
+
+  /// Where a bound tells it no sample is taken: most of a smooth field. By a margin, for what rounding does to bound and samples.
+  bool surely_below(int level, const Box& cells) const {
+    const Vec3d level_cells(grid_.cells(level));
+    const auto at = [&](const Vec3i& corner) { return domain_.at(Vec3d(corner) / level_cells); };
+    const Vec3i one(1);  // stencils reach a quarter of a cell beyond
+    return score_.most(field_, {at(cells.lower - one), at(cells.upper + one)}, domain_.extent() / level_cells) < (1 - 1e-6) * threshold_;
   }
 
   const BlockGrid& grid_;

@@ -4,9 +4,12 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <string_view>
+#include <type_traits>
 #include <utility>
 
 #include "structures/generators/analytic_fields.hpp"
@@ -29,6 +32,7 @@ constexpr int kMaxPatch = 1024;
 constexpr std::int64_t kMaxCellsAlongAxis = (std::int64_t{1} << 31) - 2 * kMaxPatch;
 constexpr std::int64_t kMaxRootBlocks = std::int64_t{1} << 24;
 constexpr std::int64_t kMaxCells = std::int64_t{1} << 31;
+constexpr std::array<std::string_view, 2> kPrecisions{"double", "single"};
 
 /// Root blocks that are left out: a random fraction of them or those with their middle in a ball.
 struct Holes {
@@ -47,6 +51,7 @@ struct MeshKeys {
   ClusterRules patches;
   double nan_fraction = 0;
   bool averaged = false;
+  RealType type = RealType::float64;
   std::uint64_t seed = 1;
 };
 
@@ -156,6 +161,7 @@ MeshKeys read_mesh_keys(SpecReader& reader, const std::string& field_type) {
   keys.holes = read_holes(reader);
   keys.nan_fraction = reader.number("nan_fraction", 0, "a number from 0 to 1", is_fraction);
   keys.averaged = reader.boolean("averaged", false);
+  keys.type = reader.choice("precision", kPrecisions[0], kPrecisions) == kPrecisions[0] ? RealType::float64 : RealType::float32;
   keys.seed = static_cast<std::uint64_t>(reader.integer("seed", 1, 0, std::numeric_limits<std::int64_t>::max()));
   return keys;
 }
@@ -210,11 +216,14 @@ class ValueSource {
       : keys_(keys), field_(field), missing_seed_(keys.seed + index) {}
 
   /// Of the cells of a box, level space.
-  CellArray<double> values(int level, const Box& box) const {
-    CellArray<double> result(static_cast<std::size_t>(box.cells()));
-    tbb::parallel_for(box.lower.z, box.upper.z, [&](int z) {
-      const Box slab{{box.lower.x, box.lower.y, z}, {box.upper.x, box.upper.y, z + 1}};
-      for_each_cell(slab, [&](const Vec3i& cell) { result[box.offset(cell)] = cell_value(level, cell); });
+  CellValues values(int level, const Box& box) const {
+    CellValues result(keys_.type, static_cast<std::size_t>(box.cells()));
+    result.visit_stored([&](auto& stored) {
+      using Real = typename std::decay_t<decltype(stored)>::value_type;
+      tbb::parallel_for(box.lower.z, box.upper.z, [&](int z) {
+        const Box slab{{box.lower.x, box.lower.y, z}, {box.upper.x, box.upper.y, z + 1}};
+        for_each_cell(slab, [&](const Vec3i& cell) { stored[box.offset(cell)] = static_cast<Real>(cell_value(level, cell)); });
+      });
     });
     if (keys_.nan_fraction > 0) remove_values(level, box, result);
     return result;
@@ -242,10 +251,10 @@ class ValueSource {
     return sum;
   }
 
-  void remove_values(int level, const Box& box, CellArray<double>& values) const {
+  void remove_values(int level, const Box& box, CellValues& values) const {
     for_each_cell(box, [&](const Vec3i& cell) {
       if (cell_random(missing_seed_, kMissingStream, level, cell) < keys_.nan_fraction)
-        values[box.offset(cell)] = std::numeric_limits<double>::quiet_NaN();
+        values.set(box.offset(cell), std::numeric_limits<double>::quiet_NaN());
     });
   }
 

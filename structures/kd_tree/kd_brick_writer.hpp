@@ -19,7 +19,7 @@ inline constexpr int kChunk = 32;
 
 /// The parts of a field that are written brick by brick.
 struct Stores {
-  HostTexture* values;  ///< one pool a field, all laid out in the same way; or one texture a brick and field
+  HostTexture* values;  ///< of each texture of the pool, or brick, one a field
   HostTexture* data;
   HostTexture* validity;  ///< null where every cell has a value
   MoreRanges more_ranges;
@@ -33,7 +33,7 @@ class BrickWriter {
       : hierarchy_(h), request_(request), options_(o), plan_(plan), field_(field), out_(out) {
     const bool leaks = field.filtering == Filtering::hardware && may_leak(o);
     for (int number = 0; number < field.field_count; ++number)
-      leak_.push_back(leaks ? leaked_value(h.statistics(request.field_at(number)), plan.packing.size) : 0);
+      leak_.push_back(leaks ? leaked_value(h.statistics(request.field_at(number)), plan.pool.packing.size) : 0);
   }
 
   void write(int brick) {
@@ -55,7 +55,7 @@ class BrickWriter {
     });
     if (!request_.needs.value_ranges) return;
     if (options_.hats) add_reaching_values(hierarchy_, request_.field_at(number), plan_.tree, plan_.hats, leaf, range_);
-    if (number == 0) data_node(leaf)[options_.bindless ? 2 : 1] = encode_range(field_, 0, whole_range(0));
+    if (number == 0) data_node(leaf)[plan_.numbered ? 2 : 1] = encode_range(field_, 0, whole_range(0));
     out_.more_ranges.set(leaf, number, whole_range(number));
   }
 
@@ -79,9 +79,9 @@ class BrickWriter {
 
   void store(int brick, int number) {
     const auto b = static_cast<std::size_t>(brick);
-    const Vec3i shift = plan_.packing.at[b] - plan_.bricks[b].texels(options_).lower;
-    const int textures = options_.bindless ? brick * field_.field_count : 0;  // of bricks before this one
-    store_box(box_, values_, shift, field_.scale_of(number), out_.values[textures + number]);
+    const Vec3i shift = plan_.pool.packing.at[b] - plan_.bricks[b].texels(options_).lower;
+    const int before = plan_.pool.texture_of[b] * field_.field_count;
+    store_box(box_, values_, shift, field_.scale_of(number), out_.values[before + number]);
   }
 
   /// Range and validity bits of what was read.

@@ -9,7 +9,7 @@
 #include "hidden_leaves.hpp"
 #include "kd_hats.hpp"
 #include "kd_partition.hpp"
-#include "structures/common/brick_packing.hpp"
+#include "kd_pool.hpp"
 #include "structures/common/build_tools.hpp"
 #include "structures/common/start_grid.hpp"
 
@@ -50,7 +50,8 @@ struct Plan {
   Pruned pruned;
   std::vector<Brick> bricks;
   std::vector<int> brick_of;  ///< a leaf
-  packing::Packing packing;   ///< bindless: every brick at 0 and the largest extents
+  PoolPacking pool;           ///< bindless: every brick at 0, in a texture of its own, and the largest extents
+  bool numbered = false;      ///< do data nodes tell the texture?
   StartGrid grid;
   std::vector<HatNode> hats;
   SupportList supports;
@@ -65,7 +66,7 @@ struct Plan {
   std::int64_t node_count() const { return static_cast<std::int64_t>(tree.nodes.size()); }
   std::int64_t brick_count() const { return static_cast<std::int64_t>(bricks.size()); }
   /// Texels of one field.
-  std::int64_t texels(const Options& o) const { return o.bindless ? brick_texels : packing.texels(); }
+  std::int64_t texels(const Options& o) const { return o.bindless ? brick_texels : pool.packing.texels() * pool.textures; }
   std::int64_t block_count() const { return static_cast<std::int64_t>(tree.leaves.size()); }
 };
 

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <bit>
+#include <numeric>
 
 #include "kd_brick_writer.hpp"
 #include "kd_bricks.hpp"
@@ -78,6 +79,13 @@ Options KdTree::options(const Json& parameters, const SceneNeeds& needs) const {
   return o;
 }
 
+/// Bindless.
+PoolPacking own_textures(std::size_t bricks, const Vec3i& largest) {
+  PoolPacking pool{{largest, std::vector<Vec3i>(bricks, Vec3i(0))}, std::vector<int>(bricks), static_cast<int>(bricks)};
+  std::iota(pool.texture_of.begin(), pool.texture_of.end(), 0);
+  return pool;
+}
+
 void KdTree::plan_pool(const BuildRequest& request, const Options& o, Plan& p) const {
   std::vector<Vec3i> sizes;
   Vec3i largest(1);
@@ -88,21 +96,23 @@ void KdTree::plan_pool(const BuildRequest& request, const Options& o, Plan& p) c
   p.brick_texels = packing::used_texels(sizes);
   const int limit = request.context.max_3d_texture_size;
   if (sizes.empty())
-    p.packing.size = Vec3i(1);
+    p.pool.packing.size = Vec3i(1);
   else if (o.bindless && std::max({largest.x, largest.y, largest.z}) <= limit)
-    p.packing = {largest, std::vector<Vec3i>(sizes.size(), Vec3i(0))};
+    p.pool = own_textures(sizes.size(), largest);
   else if (std::max({largest.x, largest.y, largest.z}) <= limit)
-    p.packing = o.paper_packing ? packing::pack_nfdh(sizes, limit) : packing::pack_best_fit(sizes, limit);
-  if (!p.packing.valid())
+    p.pool = pack_pool(request, sizes, o.paper_packing);
+  const Vec3i size = p.pool.packing.size;
+  if (!p.pool.packing.valid())
     throw UnsupportedError(
-        fmt::format("encoding kd_tree: {} bricks of up to {} x {} x {} texels do not fit a 3D texture of {} texels an axis",
-                    sizes.size(), largest.x, largest.y, largest.z, limit));
-  for (int a = 0; a < 3; ++a) p.position_bits[a] = std::bit_width(static_cast<unsigned>(p.packing.size[a] - 1));
+        fmt::format("encoding kd_tree: {} bricks of up to {} x {} x {} texels do not fit {} 3D textures of {} texels an axis",
+                    sizes.size(), largest.x, largest.y, largest.z, most_pool_textures(request.field_count()), limit));
+  p.numbered = o.bindless || p.pool.textures > 1;
+  for (int a = 0; a < 3; ++a) p.position_bits[a] = std::bit_width(static_cast<unsigned>(size[a] - 1));
   const int bits = p.position_bits.x + p.position_bits.y + p.position_bits.z;
   if (bits > 32)
     throw UnsupportedError(
         fmt::format("encoding kd_tree: positions in a {} of {} x {} x {} texels take {} bits, a data node has 32",
-                    o.bindless ? "brick" : "pool", p.packing.size.x, p.packing.size.y, p.packing.size.z, bits));
+                    o.bindless ? "brick" : "pool", size.x, size.y, size.z, bits));
 }
 
 Plan KdTree::plan(const AmrHierarchy& h, const BuildRequest& request, const Options& o) const {
@@ -131,9 +141,9 @@ Plan KdTree::plan(const AmrHierarchy& h, const BuildRequest& request, const Opti
     p.validity_words += request.field_count() * words_for_bits(block.cells.cells());
   }
   p.leaf_bricks = std::count(holds_leaf.begin(), holds_leaf.end(), 1);
-  p.data_words = 1 + (o.bindless ? 1 : 0) + (request.needs.value_ranges ? 1 : 0) + (validity ? 1 : 0);
   if (o.bindless) require_handles(*this, kBindless, p.brick_count(), request);
   plan_pool(request, o, p);
+  p.data_words = 1 + (p.numbered ? 1 : 0) + (request.needs.value_ranges ? 1 : 0) + (validity ? 1 : 0);
   if (o.grid) {
     // of one field: the grid is the same for several
     const std::int64_t others = p.texels(o) * texel_bytes(request.storage) + 8 * p.node_count();
@@ -151,22 +161,30 @@ struct TexelCounts {
   MemoryByRole by_role() const { return {.payload = leaves, .duplicated = all - cells + refined}; }
 };
 
-void add_pools(const BuildRequest& request, const Plan& p, Layout& layout) {
-  TexelCounts n{p.brick_texels, 0, p.leaf_cells, p.detail_cells};
-  for (const Brick& b : p.bricks) n.cells += b.cells.cells();
-  for (int number = 0; number < request.field_count(); ++number)
-    layout.add(layout.values(kPoolName, number, p.packing.size).holding(n.by_role()));
+void count_brick(const Options& o, const Plan& p, const Brick& b, TexelCounts& n) {
+  n.all += b.texels(o).cells();
+  n.cells += b.cells.cells();
+  for (const int leaf : b.leaves) count_block(p.tree.leaves[static_cast<std::size_t>(leaf)], n.leaves, n.refined);
+}
+
+/// Textures of all fields of the pool's first part, then of the second, ...
+void add_pools(const BuildRequest& request, const Options& o, const Plan& p, Layout& layout) {
+  std::vector<TexelCounts> counts(static_cast<std::size_t>(p.pool.textures));
+  for (std::size_t i = 0; i < p.bricks.size(); ++i) count_brick(o, p, p.bricks[i], counts[static_cast<std::size_t>(p.pool.texture_of[i])]);
+  int texture = 0;
+  for (const TexelCounts& n : counts)
+    for (int number = 0; number < request.field_count(); ++number)
+      layout.add(layout.values(kPoolName, texture++, p.pool.packing.size).holding(n.by_role()));
 }
 
 /// Textures of all fields of the first brick, then of the second, ...
 void add_brick_textures(const BuildRequest& request, const Options& o, const Plan& p, Layout& layout) {
   std::int64_t index = 0;
   for (const Brick& b : p.bricks) {
-    const Box texels = b.texels(o);
-    TexelCounts n{texels.cells(), b.cells.cells(), 0, 0};
-    for (const int leaf : b.leaves) count_block(p.tree.leaves[static_cast<std::size_t>(leaf)], n.leaves, n.refined);
+    TexelCounts n;
+    count_brick(o, p, b, n);
     for (int number = 0; number < request.field_count(); ++number) {
-      Part part = layout.values(kBricksName, 0, texels.size()).holding(n.by_role());
+      Part part = layout.values(kBricksName, 0, b.texels(o).size()).holding(n.by_role());
       part.handles = kHandlesName;
       part.handle_index = index++;
       layout.add(std::move(part));
@@ -213,7 +231,7 @@ Layout KdTree::layout(const AmrHierarchy& h, const BuildRequest& request, const 
   if (o.bindless)
     add_brick_textures(request, o, p, layout);
   else
-    add_pools(request, p, layout);
+    add_pools(request, o, p, layout);
   layout.add(buffer_part("kd_validity", "validity bits", TexelFormat::r32ui, p.validity_words)
                  .when(any_missing(h, request), "every cell has a value", Need::validity));
   layout.add(layout.more_ranges("kd_more_ranges", p.block_count()));
@@ -242,9 +260,9 @@ void write_data_nodes(const BuildRequest& request, const Options& o, const Plan&
   for (std::size_t i = 0; i < p.tree.leaves.size(); ++i, words += p.data_words) {
     const Leaf& leaf = p.tree.leaves[i];
     const auto brick = static_cast<std::size_t>(p.brick_of[i]);
-    const Vec3i at = p.packing.at[brick] + leaf.cells.lower - p.bricks[brick].texels(o).lower;
+    const Vec3i at = p.pool.packing.at[brick] + leaf.cells.lower - p.bricks[brick].texels(o).lower;
     words[0] = packed(p, at);
-    if (o.bindless) words[1] = static_cast<std::uint32_t>(brick);
+    if (p.numbered) words[1] = static_cast<std::uint32_t>(p.pool.texture_of[brick]);
     if (!validity) continue;
     words[p.data_words - 1] = static_cast<std::uint32_t>(first_word_of_leaf);
     first_word_of_leaf += request.field_count() * words_for_bits(leaf.cells.cells());
@@ -264,9 +282,9 @@ void write_bricks(const AmrHierarchy& h, const BuildRequest& request, const Opti
 }
 
 /// From the leaves' ranges, as they were written.
-LeapGrid leap_grid(const AmrHierarchy& h, const Options& o, const Plan& p, EncodedField& field) {
+LeapGrid leap_grid(const AmrHierarchy& h, const Plan& p, EncodedField& field) {
   LeapGrid grid = LeapGrid::over(h);
-  const auto* words = field.find("kd_data")->as<std::uint32_t>() + (o.bindless ? 2 : 1);
+  const auto* words = field.find("kd_data")->as<std::uint32_t>() + (p.numbered ? 2 : 1);
   for (const Leaf& leaf : p.tree.leaves) {
     grid.cover(leaf.cells.refined(h.cell_width(leaf.level)), *words);
     words += p.data_words;
@@ -301,10 +319,13 @@ void add_shader_inputs(const BuildRequest& request, const Options& o, const Plan
   defines.emplace_back("AMRTEX_KD_X_BITS", p.position_bits.x);
   defines.emplace_back("AMRTEX_KD_Y_BITS", p.position_bits.y);
   defines.emplace_back("AMRTEX_KD_BINDLESS", o.bindless ? 1 : 0);
+  defines.emplace_back("AMRTEX_KD_NUMBERED", p.numbered ? 1 : 0);
   if (o.bindless) return add_handle_access(request.context, field);
-  defines.emplace_back("AMRTEX_POOL_X", p.packing.size.x);
-  defines.emplace_back("AMRTEX_POOL_Y", p.packing.size.y);
-  defines.emplace_back("AMRTEX_POOL_Z", p.packing.size.z);
+  const Vec3i& size = p.pool.packing.size;
+  defines.emplace_back("AMRTEX_POOL_TEXTURES", p.pool.textures);
+  defines.emplace_back("AMRTEX_POOL_X", size.x);
+  defines.emplace_back("AMRTEX_POOL_Y", size.y);
+  defines.emplace_back("AMRTEX_POOL_Z", size.z);
 }
 
 Json statistics(const Options& o, const Plan& p) {
@@ -323,7 +344,9 @@ Json statistics(const Options& o, const Plan& p) {
   json["cut_subgrids"] = t.cut_subgrids;
   json["bricks"] = p.bricks.size();
   json["leaves_a_brick"] = static_cast<double>(p.leaf_count) / static_cast<double>(std::max<std::int64_t>(p.leaf_bricks, 1));
-  json["pool"] = o.bindless ? Json(nullptr) : Json{p.packing.size.x, p.packing.size.y, p.packing.size.z};
+  const Vec3i& size = p.pool.packing.size;
+  json["pool"] = o.bindless ? Json(nullptr) : Json{size.x, size.y, size.z};
+  json["pool_textures"] = o.bindless ? Json(nullptr) : Json(p.pool.textures);
   json["fill"] = static_cast<double>(p.brick_texels) / static_cast<double>(std::max<std::int64_t>(p.texels(o), 1));
   json["start_grid"] = o.grid ? Json{p.grid.cells.x, p.grid.cells.y, p.grid.cells.z} : Json(nullptr);
   json["start_depth"] = o.grid ? p.grid.depth : t.depth;
@@ -347,7 +370,7 @@ EncodedField KdTree::build(const AmrHierarchy& h, const BuildRequest& request) c
   write_optional_parts(h, o, p, field);
   field.statistics = statistics(o, p);
   add_shader_inputs(request, o, p, field);
-  if (request.needs.value_ranges) field.leaps = leap_grid(h, o, p, field);
+  if (request.needs.value_ranges) field.leaps = leap_grid(h, p, field);
   if (request.needs.draw_boxes) set_draw_tree(field, make_draw_tree(h, p.tree));
   return field;
 }

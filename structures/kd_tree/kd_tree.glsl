@@ -8,6 +8,7 @@ DEFINE_INT(AMRTEX_KD_DATA_WORDS)  // words of a data node
 DEFINE_INT(AMRTEX_KD_X_BITS)      // bits of x in a packed position
 DEFINE_INT(AMRTEX_KD_Y_BITS)      // bits of y
 DEFINE_INT(AMRTEX_KD_BINDLESS)    // 1 where each brick has its own texture, 0 where all are in the pool
+DEFINE_INT(AMRTEX_KD_NUMBERED)    // 1 where data nodes tell the brick (bindless) or the texture of a divided pool
 
 BUFFER(uvec2, kd_nodes, kd_nodes_block)
 BUFFER(uint, kd_data, kd_data_block)
@@ -18,10 +19,11 @@ UNIFORM(ivec3, u_kd_grid)                            // cells of the grid
 UNIFORM(ivec3, u_kd_grid_width)                      // x: width of a cell of the grid, finest cells
 #endif
 #if AMRTEX_CPP || !AMRTEX_KD_BINDLESS
-DEFINE_INT(AMRTEX_POOL_X)  // texels of the pool along x
+DEFINE_INT(AMRTEX_POOL_TEXTURES)  // textures that the pool of a field is divided over
+DEFINE_INT(AMRTEX_POOL_X)  // texels of each along x
 DEFINE_INT(AMRTEX_POOL_Y)  // along y
 DEFINE_INT(AMRTEX_POOL_Z)  // along z
-VALUE_TEXTURES(tex_kd_pool, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)
+VALUE_TEXTURES(tex_kd_pool, AMRTEX_FIELDS * AMRTEX_POOL_TEXTURES, AMRTEX_MOST_FIELDS * AMRTEX_MOST_POOL_TEXTURES)  // field by field, part by part
 #endif
 #if AMRTEX_CPP || AMRTEX_KD_BINDLESS
 DEFINE_INT(AMRTEX_HANDLE_TURNS)  // handles that invocations which run together may hold, 1 where a fetch takes different ones
@@ -155,14 +157,15 @@ bool locate(IN(Position) p, OUT(Region) r) {
   data *= AMRTEX_KD_DATA_WORDS;
   ivec3 texel = kd_texel_position(kd_data[data]);
   r.handle = ivec4(texel.x, texel.y, texel.z, 0);
+  if (AMRTEX_KD_NUMBERED != 0) r.brick.z = kd_data[data + 1];
 #if AMRTEX_CPP || AMRTEX_KD_BINDLESS
   if (AMRTEX_KD_BINDLESS != 0) {
-    uint number = kd_data[data + 1];
-    uvec2 brick = kd_handles[int(number) * AMRTEX_FIELDS];  // once a region; of field 0
-    r.brick = uvec4(brick.x, brick.y, number, 0u);
+    uvec2 brick = kd_handles[int(r.brick.z) * AMRTEX_FIELDS];  // once a region; of field 0
+    r.brick.x = brick.x;
+    r.brick.y = brick.y;
   }
 #endif
-  if (AMRTEX_VALUE_RANGES != 0) r.value_range = decode_range(kd_data[data + 1 + AMRTEX_KD_BINDLESS]);
+  if (AMRTEX_VALUE_RANGES != 0) r.value_range = decode_range(kd_data[data + 1 + AMRTEX_KD_NUMBERED]);
 #if AMRTEX_CPP || AMRTEX_FIELD_RANGES
   r.brick.w = data_node;
 #endif
@@ -239,13 +242,32 @@ void kd_brick_corners(IN(uvec2) brick, IN(ivec3) i, OUT(vec4r) lower, OUT(vec4r)
 }
 #endif
 
+#if AMRTEX_CPP || !AMRTEX_KD_BINDLESS
+// Lanes may be in bricks of different textures, and a context picks a texture by what is the same in all of them: each is asked in turn.
+real kd_pool_texel(IN(uint) number, IN(int) field, IN(ivec3) i) {
+  real value = real(0);
+  for (int t = 0; t < AMRTEX_POOL_TEXTURES; ++t)
+    if (AMRTEX_POOL_TEXTURES == 1 || uint(t) == number) value = texelFetch(tex_kd_pool[t * AMRTEX_FIELDS + field], i, 0).x;
+  return value;
+}
+
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+real kd_pool_filtered(IN(uint) number, IN(int) field, IN(vec3r) uvw) {
+  real value = real(0);
+  for (int t = 0; t < AMRTEX_POOL_TEXTURES; ++t)
+    if (AMRTEX_POOL_TEXTURES == 1 || uint(t) == number) value = textureLod(tex_kd_pool[t * AMRTEX_FIELDS + field], uvw, 0.0).x;
+  return value;
+}
+#endif
+#endif
+
 real kd_texel(IN(Region) r, IN(int) field, IN(ivec3) i) {
   real value = real(0);
 #if AMRTEX_CPP || AMRTEX_KD_BINDLESS
   if (AMRTEX_KD_BINDLESS != 0) value = kd_brick_texel(kd_brick(r, field), i);
 #endif
 #if AMRTEX_CPP || !AMRTEX_KD_BINDLESS
-  if (AMRTEX_KD_BINDLESS == 0) value = texelFetch(tex_kd_pool[field], i, 0).x;
+  if (AMRTEX_KD_BINDLESS == 0) value = kd_pool_texel(r.brick.z, field, i);
 #endif
   return value;
 }
@@ -284,13 +306,13 @@ real kd_filtered(IN(Region) r, IN(int) field, IN(vec3r) uvw) {
 #if AMRTEX_KD_BINDLESS
   return kd_brick_filtered(kd_brick(r, field), uvw);
 #else
-  return textureLod(tex_kd_pool[field], uvw, 0.0).x;
+  return kd_pool_filtered(r.brick.z, field, uvw);
 #endif
 }
 #endif
 
 #if AMRTEX_CPP || AMRTEX_FILTER == AMRTEX_FILTER_BASIS
-// ---- basis: leaves as pieces. store: the first word of their bits, and the number of their brick (bindless)
+// ---- basis: leaves as pieces. store: the first word of their bits, and the number of their brick (bindless) or texture
 
 BasisPiece basis_found(IN(Region) r, IN(int) node) {
   uvec4 lower = basis_supports[node * 2];
@@ -304,7 +326,7 @@ BasisPiece basis_found(IN(Region) r, IN(int) node) {
   basis_place(r, corner, width, p);
   p.texel = kd_texel_position(kd_data[data]);
   p.cells = divide_by_width(corner_of(upper) - reach - corner, width);
-  p.store = uvec2(AMRTEX_VALIDITY != 0 ? kd_data[data + AMRTEX_KD_DATA_WORDS - 1] : 0u, AMRTEX_KD_BINDLESS != 0 ? kd_data[data + 1] : 0u);
+  p.store = uvec2(AMRTEX_VALIDITY != 0 ? kd_data[data + AMRTEX_KD_DATA_WORDS - 1] : 0u, AMRTEX_KD_NUMBERED != 0 ? kd_data[data + 1] : 0u);
   return p;
 }
 
@@ -322,7 +344,7 @@ real basis_texel(IN(BasisPiece) p, IN(int) field, IN(ivec3) cell) {
   if (AMRTEX_KD_BINDLESS != 0) value = kd_brick_texel(kd_piece_brick(p, field), p.texel + cell);
 #endif
 #if AMRTEX_CPP || !AMRTEX_KD_BINDLESS
-  if (AMRTEX_KD_BINDLESS == 0) value = texelFetch(tex_kd_pool[field], p.texel + cell, 0).x;
+  if (AMRTEX_KD_BINDLESS == 0) value = kd_pool_texel(p.store.y, field, p.texel + cell);
 #endif
   return value;
 }
@@ -345,7 +367,7 @@ real basis_filtered(IN(BasisPiece) p, IN(int) field, IN(vec3r) at) {
 #if AMRTEX_KD_BINDLESS
   return kd_brick_filtered(kd_piece_brick(p, field), at / vec3r(kd_brick_size(p)));
 #else
-  return textureLod(tex_kd_pool[field], at * vec3r(1.0 / float(AMRTEX_POOL_X), 1.0 / float(AMRTEX_POOL_Y), 1.0 / float(AMRTEX_POOL_Z)), 0.0).x;
+  return kd_pool_filtered(p.store.y, field, at * vec3r(1.0 / float(AMRTEX_POOL_X), 1.0 / float(AMRTEX_POOL_Y), 1.0 / float(AMRTEX_POOL_Z)));
 #endif
 }
 #endif

@@ -11,7 +11,7 @@
 //   the node's lower corner. The first child is the one below the plane.
 //
 // A data node, AMRTEX_KD_DATA_WORDS words: where the texel of the node's lower cell (or vertex) lies in the pool or its
-// brick, x in the lowest bits, then y and z; then the number of its brick (bindless); then its coded value range, where regions
+// brick, x in the lowest bits, then y and z; then the number of its brick (bindless) or, of a divided pool, texture; then its coded value range, where regions
 // are skipped; then its first word of validity bits, where cells may have no value.
 //
 // With a level of detail, a node's data nodes stand one behind the other, the coarsest first: cells that are refined and

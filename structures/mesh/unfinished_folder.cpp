@@ -118,12 +118,12 @@ void OutputFile::write(std::string_view bytes) {
   written_ += bytes.size();
 }
 
-void OutputFile::write_doubles(const CellValues& values) {
+void OutputFile::write_cells(const CellValues& values, RealType type) {
   std::vector<double> some(std::min(values.size(), std::size_t{1} << 16));
   for (std::size_t at = 0; at < values.size(); at += some.size()) {
     some.resize(std::min(some.size(), values.size() - at));
     values.copy(at, some);
-    write_values(some);
+    type == RealType::float32 ? write_values(std::vector<float>(some.begin(), some.end())) : write_values(some);
   }
 }
 

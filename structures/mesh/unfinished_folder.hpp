@@ -51,8 +51,8 @@ class OutputFile {
   void write_values(const std::vector<T>& values) {
     write({reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)});
   }
-  /// Values of any type as doubles.
-  void write_doubles(const CellValues& values);
+  /// Values of any type as numbers of this one.
+  void write_cells(const CellValues& values, RealType type);
   std::uint64_t written() const { return written_; }
   void close();
 

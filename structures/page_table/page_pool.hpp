@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "structures/common/divided_pool.hpp"
 #include "structures/mesh/spaces.hpp"
 
 namespace amrtex::pages {
@@ -37,6 +38,31 @@ inline bool lay_out(std::int64_t blocks, int edge, int limit, PoolLayout& layout
         return true;
       }
   return false;
+}
+
+/// The pool of a field: as few textures as hold its pages, of one size, and as many pages in each.
+struct PagePool {
+  PoolLayout layout;       ///< of a texture
+  int textures = 1;
+  std::int64_t pages = 1;  ///< in a texture; the last one may have fewer
+
+  int texture_of(std::int64_t page) const { return static_cast<int>(page / pages); }
+  /// In its texture, texels.
+  Vec3i position(std::int64_t page) const { return layout.position(page % pages); }
+};
+
+/// False where the pages fit no number of textures with so many texels an axis. What does not fit by its bytes is laid out all the
+/// same, in the most textures: the structure's Layout refuses it with the numbers.
+inline bool lay_out_pool(const BuildRequest& request, int edge, std::int64_t pages, PagePool& pool) {
+  const int most = most_pool_textures(request.field_count());
+  bool fits = false;
+  for (pool.textures = 1; pool.textures <= most; ++pool.textures) {
+    pool.pages = std::max<std::int64_t>((pages + pool.textures - 1) / pool.textures, 1);
+    fits = lay_out(pool.pages, edge, request.context.max_3d_texture_size, pool.layout);
+    if (fits && takes_values(request, pool.layout.texels())) return true;
+  }
+  pool.textures = most;
+  return fits;
 }
 
 }  // namespace amrtex::pages

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <string>
 
 #include "page_draw_tree.hpp"
 #include "page_partition.hpp"
@@ -23,11 +24,11 @@ using namespace pages;
 
 constexpr std::array<Filter, 3> kFilters{Filter::nearest, Filter::linear_page, Filter::linear_vertex};
 
-/// Texels of the pool by role: cells inside the domain, and copies of others.
-MemoryByRole texels_by_role(const AmrHierarchy& h, const Options& o, const std::vector<Page>& pages) {
+/// Texels of one texture of the pool by role: cells inside the domain, and copies of others.
+MemoryByRole texels_by_role(const AmrHierarchy& h, const Options& o, const std::vector<Page>& pages, const PagePool& pool, int texture) {
   MemoryByRole texels;
   for (const Page& p : pages) {
-    if (p.kind != AMRTEX_PAGE_STORED) continue;
+    if (p.kind != AMRTEX_PAGE_STORED || pool.texture_of(p.index) != texture) continue;
     const Vec3i first = p.index_in_level * o.page_size;
     texels.payload += intersection(Box{first, first + Vec3i(o.page_size)}, h.domain(p.level)).cells();
     texels.duplicated += o.page_texels() - o.page_cells();
@@ -40,7 +41,7 @@ struct Sizes {
   std::int64_t stored = 0, constant = 0, pruned = 0;
   std::int64_t without_mesh = 0;  ///< pages of level 0 that are not listed
   TablePlan table;
-  PoolLayout pool;
+  PagePool pool;
 };
 
 class PageTable final : public Encoding {
@@ -100,14 +101,23 @@ TablePlan plan_table(const AmrHierarchy& h, const BuildRequest& request, const O
       .plan(pages, bytes_of_pages(request, o, std::ssize(pages)));
 }
 
-PoolLayout plan_pool(const BuildRequest& request, const Options& o, std::int64_t stored) {
-  PoolLayout pool;
-  const int limit = request.context.max_3d_texture_size;
-  if (!lay_out(std::max<std::int64_t>(stored, 1), o.edge, limit, pool))
+PagePool plan_pool(const BuildRequest& request, const Options& o, std::int64_t stored) {
+  PagePool pool;
+  if (!lay_out_pool(request, o.edge, stored, pool))
     throw UnsupportedError(
-        fmt::format("encoding page_table with page_size {}: {} pages of {}^3 texels do not fit a 3D texture of {} texels an axis",
-                    o.page_size, stored, o.edge, limit));
+        fmt::format("encoding page_table with page_size {}: {} pages of {}^3 texels do not fit {} 3D textures of {} texels an axis",
+                    o.page_size, stored, o.edge, pool.textures, request.context.max_3d_texture_size));
   return pool;
+}
+
+/// Bytes that all pages may take in any number of textures.
+std::int64_t most_page_bytes(const BuildRequest& request) {
+  const int textures = most_pool_textures(request.field_count()) * request.field_count();
+  return std::min(request.memory_limit, (CheckedSize(request.context.max_texture_bytes) * textures).or_most());
+}
+
+std::string remedy(const Options& o, const Sizes& s, const std::string& stored) {
+  return fmt::format("; page_size is {}, {} pages are stored, in {} textures a field", o.page_size, stored, s.pool.textures);
 }
 
 /// From the boxes of patches, before a page is listed.
@@ -123,7 +133,7 @@ void PageTable::require_pages(const BuildRequest& request, const Options& o, con
 /// Where all pages would pass a limit: what surely are stored may do so, and nothing needs to be read to know it.
 void PageTable::require_least(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const Division& division,
                               const std::vector<Page>& pages) const {
-  const std::int64_t most = std::min(request.memory_limit, request.context.max_texture_bytes);
+  const std::int64_t most = most_page_bytes(request);
   if (bytes_of_pages(request, o, std::ssize(pages)) <= most) return;
   Sizes least;
   const std::int64_t enough = most / bytes_of_pages(request, o, 1);
@@ -131,7 +141,7 @@ void PageTable::require_least(const AmrHierarchy& h, const BuildRequest& request
   least.table = plan_table(h, request, o, division, pages, false);
   least.pool = plan_pool(request, o, least.stored);
   Layout parts = layout(h, request, o, least, pages);
-  parts.set_remedy(fmt::format("; page_size is {}, at least {} of {} pages are stored", o.page_size, least.stored, pages.size()));
+  parts.set_remedy(remedy(o, least, fmt::format("at least {} of {}", least.stored, pages.size())));
   parts.require_limits();
   parts.require_budget();
 }
@@ -165,8 +175,11 @@ Layout PageTable::layout(const AmrHierarchy& h, const BuildRequest& request, con
   layout.add(s.table.sub_part());
   layout.add(s.table.nodes_part());
   layout.add(s.table.stages_part());
-  for (int number = 0; number < fields; ++number)
-    layout.add(layout.values("tex_pages", number, s.pool.texels()).holding(texels_by_role(h, o, pages)));
+  for (int texture = 0; texture < s.pool.textures; ++texture) {
+    const MemoryByRole texels = texels_by_role(h, o, pages, s.pool, texture);
+    for (int number = 0; number < fields; ++number)
+      layout.add(layout.values("tex_pages", texture * fields + number, s.pool.layout.texels()).holding(texels));
+  }
   layout.add(buffer_part("page_validity", "validity bits", TexelFormat::r32ui, s.stored * fields * o.page_words())
                  .when(validity, "every cell has a value", Need::validity));
   if (!s.table.green)  // as large as the first
@@ -179,7 +192,7 @@ Layout PageTable::layout(const AmrHierarchy& h, const BuildRequest& request, con
   }
   layout.add(layout.more_ranges("page_more_ranges", s.stored));
   layout.add_working(static_cast<std::int64_t>(pages.size() * sizeof(Page)));
-  layout.set_remedy(fmt::format("; page_size is {}, {} pages are stored", o.page_size, s.stored));
+  layout.set_remedy(remedy(o, s, std::to_string(s.stored)));
   return layout;
 }
 
@@ -203,6 +216,7 @@ Json statistics(const AmrHierarchy& h, const Options& o, const std::vector<Page>
   json["pruned_pages"] = s.pruned;
   json["pages_a_level"] = levels;
   json["page_texels"] = o.page_texels();
+  json["pool_textures"] = s.pool.textures;
   json["border_overhead"] = static_cast<double>(s.stored * (o.page_texels() - o.page_cells())) / pages_cells;
   json["border_overhead_formula"] = static_cast<double>(o.page_texels()) / static_cast<double>(o.page_cells()) - 1;
   json["oversampling"] = static_cast<double>(cells) / static_cast<double>(h.leaf_cells());
@@ -235,13 +249,15 @@ void add_shader_inputs(const AmrHierarchy& h, const Options& o, const Sizes& siz
   defines.emplace_back("AMRTEX_PAGE_TABLE_LEVELS", table.levels());
   defines.emplace_back("AMRTEX_PAGE_TABLE_TREE", table.tree && table.levels() > 1 ? 1 : 0);
   defines.emplace_back("AMRTEX_PAGE_ENTRY_WORDS", table.entry_words());
-  const Vec3i pool = size.pool.texels();
+  const Vec3i pool = size.pool.layout.texels();
+  defines.emplace_back("AMRTEX_POOL_TEXTURES", size.pool.textures);
   defines.emplace_back("AMRTEX_POOL_X", pool.x);
   defines.emplace_back("AMRTEX_POOL_Y", pool.y);
   defines.emplace_back("AMRTEX_POOL_Z", pool.z);
   auto& uniforms = field.integer_uniforms;
   uniforms.emplace_back("u_page_table", Vec3i(table.entry_width, 0, 0));
-  uniforms.emplace_back("u_pool_shift", size.pool.shift);
+  uniforms.emplace_back("u_pool_shift", size.pool.layout.shift);
+  if (size.pool.textures > 1) uniforms.emplace_back("u_pool_pages", Vec3i(static_cast<int>(size.pool.pages), 0, 0));
   if (!table.two_levels()) return;
   uniforms.emplace_back("u_subtable", Vec3i(table.sub_edge, o.page_size * h.cell_width(table.finest_level), 0));
   uniforms.emplace_back("u_subtable_shift", table.sub_layout.shift);

@@ -8,7 +8,8 @@ DEFINE_INT(AMRTEX_PAGE_CONSTANTS)     // 1 where constant pages exist, else 0
 DEFINE_INT(AMRTEX_PAGE_TABLE_LEVELS)  // look-ups that find a page, at most
 DEFINE_INT(AMRTEX_PAGE_TABLE_TREE)    // 1 where sub-tables form a tree in a buffer, 0 where the second level is a texture
 DEFINE_INT(AMRTEX_PAGE_ENTRY_WORDS)   // channels of an entry, 1 or 2
-DEFINE_INT(AMRTEX_POOL_X)             // texels of the pool along x
+DEFINE_INT(AMRTEX_POOL_TEXTURES)      // textures that the pool of a field is divided over
+DEFINE_INT(AMRTEX_POOL_X)             // texels of each along x
 DEFINE_INT(AMRTEX_POOL_Y)             // along y
 DEFINE_INT(AMRTEX_POOL_Z)             // along z
 
@@ -22,9 +23,12 @@ INTEGER_TEXTURE(tex_page_subtables)
 UNIFORM(ivec3, u_subtable)        // x: entries along an edge; y: width of an entry, finest cells; z: unused
 UNIFORM(ivec3, u_subtable_shift)  // log2 of sub-tables along x and y of their texture
 #endif
-VALUE_TEXTURES(tex_pages, AMRTEX_FIELDS, AMRTEX_MOST_FIELDS)
+VALUE_TEXTURES(tex_pages, AMRTEX_FIELDS * AMRTEX_POOL_TEXTURES, AMRTEX_MOST_FIELDS * AMRTEX_MOST_POOL_TEXTURES)  // field by field, part by part
 UNIFORM(ivec3, u_page_table)     // x: width of an entry of the first level, finest cells
-UNIFORM(ivec3, u_pool_shift)     // log2 of pages along x and y of the pool
+UNIFORM(ivec3, u_pool_shift)     // log2 of pages along x and y of a texture of the pool
+#if AMRTEX_CPP || AMRTEX_POOL_TEXTURES > 1
+UNIFORM(ivec3, u_pool_pages)     // x: pages in a texture of the pool
+#endif
 #if AMRTEX_CPP || AMRTEX_VALIDITY
 BUFFER(uint, page_validity, page_validity_block)  // one bit a cell, each field of each page from a new word
 #endif
@@ -95,7 +99,14 @@ bool locate(IN(Position) p, OUT(Region) r) {
 #endif
   r.value_range = vec2r(0);
   int index = page_entry_index(entry.x);
-  ivec3 texel = page_pool_position(index, u_pool_shift) * AMRTEX_PAGE_EDGE;
+  int in_texture = index;
+#if AMRTEX_CPP || AMRTEX_POOL_TEXTURES > 1
+  if (AMRTEX_POOL_TEXTURES > 1) {
+    r.brick.x = uint(index / u_pool_pages.x);
+    in_texture = index % u_pool_pages.x;
+  }
+#endif
+  ivec3 texel = page_pool_position(in_texture, u_pool_shift) * AMRTEX_PAGE_EDGE;
   r.handle = ivec4(texel.x, texel.y, texel.z, index);
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
   // a cell's centre is its texel's; a vertex sits on the corner, half a texel from its own
@@ -120,25 +131,42 @@ bool page_has_value(IN(Region) r, IN(int) field, IN(ivec3) cell) {
 }
 #endif
 
-real page_texel(IN(int) field, IN(ivec3) texel) { return texelFetch(tex_pages[field], texel, 0).x; }
+int page_texture(IN(Region) r) { return AMRTEX_POOL_TEXTURES > 1 ? int(r.brick.x) : 0; }
+
+// Lanes may be in pages of different textures, and a context picks a texture by what is the same in all of them: each is asked in turn.
+real page_texel(IN(Region) r, IN(int) field, IN(ivec3) texel) {
+  real value = real(0);
+  for (int i = 0; i < AMRTEX_POOL_TEXTURES; ++i)
+    if (i == page_texture(r)) value = texelFetch(tex_pages[i * AMRTEX_FIELDS + field], texel, 0).x;
+  return value;
+}
+
+#if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
+real page_filtered(IN(Region) r, IN(int) field, IN(vec3r) uvw) {
+  real value = real(0);
+  for (int i = 0; i < AMRTEX_POOL_TEXTURES; ++i)
+    if (i == page_texture(r)) value = textureLod(tex_pages[i * AMRTEX_FIELDS + field], uvw, 0.0).x;
+  return value;
+}
+#endif
 
 real page_stored_value(IN(Region) r, IN(int) field, IN(vec3r) q) {
   ivec3 page = ivec3(r.handle.x, r.handle.y, r.handle.z);
   if (AMRTEX_FILTER == AMRTEX_FILTER_NEAREST) {
     ivec3 cell = clamp(ivec3(floor(q)), ivec3(0), ivec3(AMRTEX_PAGE_SIZE - 1));
-    return decode_value(page_texel(field, page + cell + AMRTEX_PAGE_BORDER), field);
+    return decode_value(page_texel(r, field, page + cell + AMRTEX_PAGE_BORDER), field);
   }
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
-  return decode_value(textureLod(tex_pages[field], r.texture_lower + q * r.texture_scale, 0.0).x, field);
+  return decode_value(page_filtered(r, field, r.texture_lower + q * r.texture_scale), field);
 #else
   PRECISE vec3r from_first = AMRTEX_PAGE_NODES != 0 ? q : q + vec3r(real(AMRTEX_PAGE_BORDER) - real(0.5));
   vec3r whole = clamp(floor(from_first), vec3r(0), vec3r(AMRTEX_PAGE_EDGE - 2));
   vec3r f = from_first - whole;
   ivec3 i = page + ivec3(whole);
-  return decode_value(trilinear(page_texel(field, i), page_texel(field, i + ivec3(1, 0, 0)), page_texel(field, i + ivec3(0, 1, 0)),
-                                page_texel(field, i + ivec3(1, 1, 0)), page_texel(field, i + ivec3(0, 0, 1)),
-                                page_texel(field, i + ivec3(1, 0, 1)), page_texel(field, i + ivec3(0, 1, 1)),
-                                page_texel(field, i + ivec3(1, 1, 1)), f), field);
+  return decode_value(trilinear(page_texel(r, field, i), page_texel(r, field, i + ivec3(1, 0, 0)), page_texel(r, field, i + ivec3(0, 1, 0)),
+                                page_texel(r, field, i + ivec3(1, 1, 0)), page_texel(r, field, i + ivec3(0, 0, 1)),
+                                page_texel(r, field, i + ivec3(1, 0, 1)), page_texel(r, field, i + ivec3(0, 1, 1)),
+                                page_texel(r, field, i + ivec3(1, 1, 1)), f), field);
 #endif
 }
 

@@ -106,6 +106,32 @@ TEST(PageTable, MemoryIsTheSumOfItsTexels) {
   }
 }
 
+// In double and to the bit, at every leaf; the same pages, so many bytes more as the last texture has room.
+TEST(PageTable, IsDividedOverTexturesWhereOneHoldsTooFewPages) {
+  const AmrHierarchy h = holes_and_missing(waves).hierarchy();
+  for (const Filter filter : kAllFilters) {
+    const EncodedField one = page_field(h, filter, 4, {.storage = Storage::r64f});
+    const std::int64_t pages = one.statistics["pages"].get<std::int64_t>();
+    const std::int64_t page_bytes = 8 * one.statistics["page_texels"].get<std::int64_t>();
+    for (const std::int64_t textures : {1, 2, 3, 8}) {
+      ContextInfo limits;
+      // rows of pages are powers of two: room for twice as many surely holds them
+      limits.max_texture_bytes = std::max(2 * pages * page_bytes / textures, page_bytes);
+      const EncodedField several = page_field(h, filter, 4, {.storage = Storage::r64f, .limits = limits});
+      const auto taken = several.statistics["pool_textures"].get<std::int64_t>();
+      EXPECT_LE(taken, textures);
+      if (textures == 8) EXPECT_GT(taken, 1);
+      EXPECT_EQ(several.statistics["pages"], pages);
+      EXPECT_EQ(several.memory().payload, one.memory().payload);
+      EXPECT_EQ(several.memory().duplicated, one.memory().duplicated);
+      for (const HostTexture& t : several.textures)
+        if (t.holds_values) EXPECT_LE(t.bytes(), limits.max_texture_bytes);
+      const Comparison result = compare_double(h, several, probe_positions(h, 30));
+      EXPECT_TRUE(result) << result;
+    }
+  }
+}
+
 TEST(PageTable, ConstantPagesCostAnEntryAndNoPage) {
   const auto with = [](const Vec3i& odd) {
     return MeshBuilder(Vec3i(16)).root([=](const Vec3d& p) { return Vec3i(p * 16.0) == odd ? 3.0 : 2.0; }).hierarchy();
@@ -277,7 +303,7 @@ TEST(PageTable, NamesTheLimitThatItWouldPass) {
     find_encoding("page_table").build(h, request);
     ADD_FAILURE();
   } catch (const UnsupportedError& e) {
-    EXPECT_THAT(e.what(), AllOf(HasSubstr("125 pages of 16^3 texels"), HasSubstr("70 texels an axis")));
+    EXPECT_THAT(e.what(), AllOf(HasSubstr("125 pages of 16^3 texels"), HasSubstr("8 3D textures of 70 texels an axis")));
   }
 }
 

@@ -16,9 +16,9 @@
 
 namespace amrtex::pages {
 
-inline void write_page(const Options& o, const PoolLayout& pool, std::int64_t index, Storage storage, StorageScale scale,
-                       std::span<const double> values, HostTexture& texture) {
-  const Vec3i at = pool.position(index);
+/// `at`: its first texel.
+inline void write_page(const Options& o, const Vec3i& at, Storage storage, StorageScale scale, std::span<const double> values,
+                       HostTexture& texture) {
   const Box all{Vec3i(0), texture.size};
   const auto edge = static_cast<std::size_t>(o.edge);
   for (int z = 0; z < o.edge; ++z)
@@ -31,7 +31,7 @@ inline void write_page(const Options& o, const PoolLayout& pool, std::int64_t in
 class PageWriter {
  public:
   /// `field`: with its parts, which are written.
-  PageWriter(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const PoolLayout& pool, EncodedField& field)
+  PageWriter(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const PagePool& pool, EncodedField& field)
       : request_(request),
         options_(o),
         pool_(pool),
@@ -41,17 +41,16 @@ class PageWriter {
         more_ranges_(field, "page_more_ranges") {
     // node-centred pages lie side by side without a border
     const bool leaks = field.filtering == Filtering::hardware && o.nodes;
-    for (int number = 0; number < field.field_count; ++number) {
-      pools_.push_back(field.find(element_name("tex_pages", number)));
-      leak_.push_back(leaks ? leaked_value(h.statistics(request.field_at(number)), pool.texels()) : 0);
-    }
+    for (int i = 0; i < field.field_count * pool.textures; ++i) pools_.push_back(field.find(element_name("tex_pages", i)));
+    for (int number = 0; number < field.field_count; ++number)
+      leak_.push_back(leaks ? leaked_value(h.statistics(request.field_at(number)), pool.layout.texels()) : 0);
   }
 
   void write(Page& page) {
     for (int number = 0; number < field_.field_count; ++number) {
       const PageContents contents = reader_.read(page, request_.field_at(number));
-      write_page(options_, pool_, page.index, request_.storage, field_.scale_of(number), reader_.values(),
-                 *pools_[static_cast<std::size_t>(number)]);
+      write_page(options_, pool_.position(page.index), request_.storage, field_.scale_of(number), reader_.values(),
+                 *pools_[static_cast<std::size_t>(pool_.texture_of(page.index) * field_.field_count + number)]);
       if (validity_ != nullptr) reader_.write_validity(page, validity_words(page, number));
       if (number == 0 && request_.needs.value_ranges) page.green = coded_range(contents);
       more_ranges_.set(page.index, number, range_of(contents, number));
@@ -72,17 +71,17 @@ class PageWriter {
 
   const BuildRequest& request_;
   const Options& options_;
-  const PoolLayout& pool_;
+  const PagePool& pool_;
   const EncodedField& field_;
   PageReader reader_;
-  std::vector<HostTexture*> pools_;  ///< one a field, all laid out in the same way
+  std::vector<HostTexture*> pools_;  ///< of each texture of the pool one a field, all laid out in the same way
   HostTexture* validity_;            ///< null where every cell has a value
   MoreRanges more_ranges_;
   std::vector<double> leak_;  ///< of each field
 };
 
 /// Reads the stored pages once more, to store them.
-inline void store_pages(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const PoolLayout& pool,
+inline void store_pages(const AmrHierarchy& h, const BuildRequest& request, const Options& o, const PagePool& pool,
                         std::vector<Page>& pages, EncodedField& field) {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pages.size(), 8), [&](const auto& range) {
     PageWriter writer(h, request, o, pool, field);

@@ -15,7 +15,7 @@ bool is_amrex_plotfile(const std::filesystem::path& path);
 
 MeshDescription read_amrex_plotfile(const std::filesystem::path& path, const FieldChoice& fields);
 
-/// Writes float64 FABs, little endian, Cell_H version 1, one data file a level, into
+/// Writes FABs of float32 where all fields of the patch are, else of float64, little endian, Cell_H version 1, one data file a level, into
 /// a folder that must not exist yet; nothing is left behind on failure.
 void write_amrex_plotfile(const AmrHierarchy& hierarchy, const std::filesystem::path& path);
 

@@ -1,7 +1,8 @@
-// Writes plotfiles: float64 FABs, little endian, `Cell_H` version 1, one data file a level.
+// Writes plotfiles: FABs of float32 where all fields of the patch are, else of float64, little endian, `Cell_H` version 1, one data file a level.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -52,12 +53,28 @@ std::string header_text(const AmrHierarchy& mesh) {
   return s;
 }
 
-/// Range of the values that are numbers: AMReX reads its tables by stream extraction, which fails on "nan".
+/// One type for all fields of a patch; means of refined cells are rounded to it.
+RealType type_of(const Patch& patch) {
+  const bool single = std::all_of(patch.values.begin(), patch.values.end(),
+                                  [](const CellValues& values) { return values.type() == RealType::float32; });
+  return single ? RealType::float32 : RealType::float64;
+}
+
+std::string_view fab_descriptor(RealType type) {
+  return type == RealType::float32 ? "((8, (32 8 23 0 1 9 0 127)),(4, (4 3 2 1)))"
+                                   : "((8, (64 11 52 0 1 12 0 1023)),(8, (8 7 6 5 4 3 2 1)))";
+}
+
+/// Range of the values that are numbers, as they are written: AMReX reads its tables by stream extraction, which fails on "nan".
 /// Without any number, the range that AMReX takes for empty.
-std::pair<double, double> finite_range(const CellValues& values) {
+std::pair<double, double> finite_range(const CellValues& values, RealType type) {
   std::pair<double, double> range{std::numeric_limits<double>::max(), std::numeric_limits<double>::lowest()};
-  for (double v : values)
-    if (std::isfinite(v)) range = {std::min(range.first, v), std::max(range.second, v)};
+  values.visit([&](const auto& view) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const double v = type == RealType::float32 ? static_cast<double>(static_cast<float>(view[i])) : view[i];
+      if (std::isfinite(v)) range = {std::min(range.first, v), std::max(range.second, v)};
+    }
+  });
   return range;
 }
 
@@ -68,9 +85,9 @@ std::vector<std::uint64_t> write_level_data(const AmrHierarchy& mesh, int level,
   OutputFile out(path);
   for (const Patch& patch : mesh.patches(level)) {
     offsets.push_back(out.written());
-    out.write(fmt::format("FAB ((8, (64 11 52 0 1 12 0 1023)),(8, (8 7 6 5 4 3 2 1))){} {}\n", box_text(patch.box),
-                          patch.values.size()));
-    for (const CellValues& values : patch.values) out.write_doubles(values);
+    const RealType type = type_of(patch);
+    out.write(fmt::format("FAB {}{} {}\n", fab_descriptor(type), box_text(patch.box), patch.values.size()));
+    for (const CellValues& values : patch.values) out.write_cells(values, type);
   }
   out.close();
   return offsets;
@@ -87,7 +104,7 @@ void write_cell_header(const AmrHierarchy& mesh, int level, const std::vector<st
   std::string maxima = minima;
   for (const Patch& patch : patches) {
     for (const CellValues& values : patch.values) {
-      const auto [lowest, highest] = finite_range(values);
+      const auto [lowest, highest] = finite_range(values, type_of(patch));
       minima += fmt::format("{:.17e},", lowest);
       maxima += fmt::format("{:.17e},", highest);
     }
