@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <malloc.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "bench/cli/commands.hpp"
 #include "bench/cli/context_arguments.hpp"
@@ -51,7 +53,15 @@ std::vector<PngColor> bar_colors(const ColorPoints& points) {
   return colors;
 }
 
-void write_picture(const Arguments& a, const Picture& picture, const Scene& scene, const AmrHierarchy& mesh) {
+/// What a picture tells of the mesh that it shows.
+struct Shown {
+  std::string quantity;
+  DomainGeometry geometry;
+};
+
+Shown shown(const Scene& scene, const AmrHierarchy& mesh) { return {printable(shown_quantity(scene, mesh)), mesh}; }
+
+void write_picture(const Arguments& a, const Picture& picture, const Scene& scene, const Shown& mesh) {
   const fs::path path = a.output;
   if (path.extension() == ".npy") return write_npy(picture, path, a.reference);
   if (path.extension() == ".exr") return write_exr(picture, path);
@@ -62,19 +72,19 @@ void write_picture(const Arguments& a, const Picture& picture, const Scene& scen
   options.color_bar = a.color_bar;
   options.logarithmic =
       scene.settings.picture_channels() == 1 && scene.settings.draws_surfaces() ? false : scene.transfer_function.logarithmic;
-  options.title = printable(shown_quantity(scene, mesh));
+  options.title = mesh.quantity;
   const bool named = std::find(color_map_names().begin(), color_map_names().end(), a.color_map) != color_map_names().end();
   options.colors = bar_colors(picture.channels == 1 ? color_map(named ? std::string_view(a.color_map) : "viridis")
                                                     : shown_colors(scene).color);
   if (a.outline)
     for (const auto& [x0, y0, x1, y1] :
-         box_edges(mesh.domain_lower(), mesh.domain_upper(), scene.view, picture.width, picture.height))
+         box_edges(mesh.geometry.lower, mesh.geometry.upper, scene.view, picture.width, picture.height))
       options.lines.push_back({x0, y0, x1, y1});
-  write_png(without_outside(picture, scene, mesh), path, options);
+  write_png(without_outside(picture, scene, mesh.geometry), path, options);
 }
 
 /// What drawing took, or how far off the picture is, pixel by pixel.
-void write_heat(const Arguments& a, Heat heat, const Picture& picture, const AmrHierarchy& mesh) {
+void write_heat(const Arguments& a, Heat heat, const Picture& picture, const DomainGeometry& geometry) {
   const fs::path path = a.output;
   if (path.extension() == ".npy") return write_npy(picture, path, false);
   if (path.extension() == ".exr") return write_exr(picture, path);
@@ -83,7 +93,7 @@ void write_heat(const Arguments& a, Heat heat, const Picture& picture, const Amr
   options.color_bar = !a.no_color_bar;
   options.title = heat_name(heat);
   options.colors = bar_colors(color_map(heat == Heat::error ? "cool_warm" : "viridis"));
-  if (heat == Heat::level) options.range = {0.0, static_cast<double>(std::max(1, mesh.finest_level()))};
+  if (heat == Heat::level) options.range = {0.0, static_cast<double>(std::max(1, geometry.finest_level()))};
   if (heat == Heat::error) options.range = around_zero(picture);
   write_png(picture, path, options);
 }
@@ -148,7 +158,18 @@ void check_arguments(const Arguments& a) {
 /// A scene and the mesh that it draws.
 struct Drawn {
   Experiment scene;
-  AmrHierarchy mesh;
+  std::optional<AmrHierarchy> read = {};
+
+  /// Read again where it was given back.
+  const AmrHierarchy& mesh() {
+    if (!read) read = load_dataset(scene, scene.datasets[scene.builds.front().dataset]);
+    return *read;
+  }
+  /// To the system: the allocator would keep what many small patches took.
+  void give_back_mesh() {
+    read.reset();
+    malloc_trim(0);
+  }
 };
 
 std::vector<std::string> together(std::vector<std::string> first, const std::vector<std::string>& then) {
@@ -186,14 +207,14 @@ Drawn describe_data(const Arguments& a) {
   return {std::move(scene), std::move(mesh)};
 }
 
-BuildRequest build_request(const Arguments& a, const Drawn& d, const Scene& drawn, Context& context) {
+BuildRequest build_request(const Arguments& a, Drawn& d, const Scene& drawn, Context& context) {
   const BuildPoint& build = d.scene.builds.front();
   BuildRequest request;
   request.storage = build.storage;
   request.parameters = build.parameters;
   request.context = context.info();
   request.needs = scene_needs(drawn, build.filter, build.filtering);
-  request.more_fields = more_fields(d.mesh, drawn);
+  request.more_fields = more_fields(d.mesh(), drawn);
   if (!a.memory_limit.empty())
     request.memory_limit = parse_bytes(a.memory_limit);
   else if (d.scene.memory_limit)
@@ -201,36 +222,41 @@ BuildRequest build_request(const Arguments& a, const Drawn& d, const Scene& draw
   return request;
 }
 
-void draw(const Arguments& a, const Drawn& d, const Scene& drawn, Context& context) {
+/// Is the mesh asked again once the structure is built?
+bool compares(const Arguments& a) { return a.explain_error || (!a.heat.empty() && parse_heat(a.heat) == Heat::error); }
+
+void draw(const Arguments& a, Drawn& d, const Scene& drawn, Context& context) {
   const BuildPoint& build = d.scene.builds.front();
   const BuildRequest request = build_request(a, d, drawn, context);
   const Encoding& encoding = find_encoding(build.encoding);
   require_support(encoding, request.context);
-  EncodedField field = encoding.build(d.mesh, request);
+  EncodedField field = encoding.build(d.mesh(), request);
+  const Shown of_mesh = shown(drawn, d.mesh());
   for (const std::string& warning : value_resolution(field, drawn).warnings()) fmt::print(stderr, "warning: {}\n", warning);
   if (a.reference) {
-    write_picture(a, HierarchyReference(d.mesh, 0, field.definition).render(drawn, reference_rule(d.scene, a.reference_step, a.reference_tolerance)), drawn, d.mesh);
+    write_picture(a, HierarchyReference(d.mesh(), 0, field.definition).render(drawn, reference_rule(d.scene, a.reference_step, a.reference_tolerance)), drawn, of_mesh);
     return;
   }
+  if (!compares(a)) d.give_back_mesh();  // before the context takes as much as the structure has
   const Structure structure(context, std::move(field), request, a.explain_error ? HostArrays::keep : HostArrays::give_back);
-  const auto consumer = make_consumer(context, d.mesh, structure, drawn);
+  const auto consumer = make_consumer(context, of_mesh.geometry, structure, drawn);
   const Heat heat = a.heat.empty() ? Heat::error : parse_heat(a.heat);
   if (heat != Heat::error) {
     const RenderSettings& s = drawn.settings;
-    return write_heat(a, heat, counted_picture(heat, consumer->count_pixels(), s.width, s.height), d.mesh);
+    return write_heat(a, heat, counted_picture(heat, consumer->count_pixels(), s.width, s.height), of_mesh.geometry);
   }
   consumer->draw();
   const Picture picture = consumer->read();
   if (!a.heat.empty()) {
-    const HierarchyReference reference(d.mesh, 0, structure.field.definition);
-    return write_heat(a, heat, error_picture(picture, reference.render(drawn, reference_rule(d.scene, a.reference_step, a.reference_tolerance))), d.mesh);
+    const HierarchyReference reference(d.mesh(), 0, structure.field.definition);
+    return write_heat(a, heat, error_picture(picture, reference.render(drawn, reference_rule(d.scene, a.reference_step, a.reference_tolerance))), of_mesh.geometry);
   }
-  if (!a.output.empty()) write_picture(a, picture, drawn, d.mesh);
+  if (!a.output.empty()) write_picture(a, picture, drawn, of_mesh);
   if (a.explain_error) {
     const ReferenceRule rule = reference_rule(d.scene, a.reference_step, a.reference_tolerance);
-    const Picture reference = HierarchyReference(d.mesh, 0, structure.field.definition).render(drawn, rule);
+    const Picture reference = HierarchyReference(d.mesh(), 0, structure.field.definition).render(drawn, rule);
     const auto truth = analytic_field(d.scene.datasets[build.dataset]);
-    explain_error(a, {d.mesh, encoding, structure, context, drawn, reference, picture, rule, truth.get()});
+    explain_error(a, {d.mesh(), encoding, structure, context, drawn, reference, picture, rule, truth.get()});
   }
 }
 
@@ -254,7 +280,7 @@ int run(Arguments a) {
     Scene drawn = with_tolerance(scene_of(d.scene, d.scene.renders.front()), a.tolerance);
     drawn.settings.prune = drawn.settings.prune || a.prune;
     const auto context = make_context(a.context.choice(d.scene.context));
-    for (const std::string& warning : scene_warnings(d.mesh, drawn)) fmt::print(stderr, "warning: {}\n", printable(warning));
+    for (const std::string& warning : scene_warnings(d.mesh(), drawn)) fmt::print(stderr, "warning: {}\n", printable(warning));
     draw_by_first(d.scene.builds.front(), data && free_encoding(a, d), [&] { draw(a, d, drawn, *context); });
   }
   save_scene(a, d);

@@ -36,13 +36,13 @@ std::string shown_quantity(const Scene& scene, const AmrHierarchy& mesh) {
   return shown_quantity(scene, named(0), color_field.empty() ? "" : named(mesh.field_index(color_field)));
 }
 
-Picture without_outside(const Picture& picture, const Scene& scene, const AmrHierarchy& mesh) {
+Picture without_outside(const Picture& picture, const Scene& scene, const DomainGeometry& geometry) {
   if (picture.channels != 1 || scene.settings.mirror) return picture;
   Picture inside = picture;
   const CameraFrame camera = camera_frame(scene.view, picture.width, picture.height);
   for (int y = 0; y < picture.height; ++y)
     for (int x = 0; x < picture.width; ++x)
-      if (!meets_box(camera_ray(camera, x, y, picture.width, picture.height), mesh.domain_lower(), mesh.domain_upper()))
+      if (!meets_box(camera_ray(camera, x, y, picture.width, picture.height), geometry.lower, geometry.upper))
         *inside.pixel(x, y) = std::numeric_limits<double>::quiet_NaN();
   return inside;
 }

@@ -16,6 +16,6 @@ std::string shown_quantity(const Scene& scene, const std::string& field);
 /// The same of the mesh's first field, with its unit where the file says it.
 std::string shown_quantity(const Scene& scene, const AmrHierarchy& mesh);
 /// Raw values of rays that pass the domain are none, rather than 0: what lies around it is background.
-Picture without_outside(const Picture& picture, const Scene& scene, const AmrHierarchy& mesh);
+Picture without_outside(const Picture& picture, const Scene& scene, const DomainGeometry& geometry);
 
 }  // namespace amrtex

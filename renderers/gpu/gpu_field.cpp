@@ -10,8 +10,8 @@
 namespace amrtex {
 namespace {
 
-// some drivers count the bytes of one call in 32 bits
-constexpr std::int64_t kMaxBytesPerCall = (std::int64_t{1} << 30) - 1;
+// some drivers count the bytes of one call in 32 bits; and what a call took may be given back before the next
+constexpr std::int64_t kMaxBytesPerCall = std::int64_t{1} << 26;
 
 struct GlFormat {
   TexelFormat host;
@@ -128,14 +128,17 @@ void set_sampling(const GladGLContext& gl, GLuint id, bool linear) {
   for (GLenum axis : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, GL_TEXTURE_WRAP_R}) gl.TextureParameteri(id, axis, GL_CLAMP_TO_EDGE);
 }
 
-void fill_texture(const GladGLContext& gl, GLuint id, const HostTexture& host) {
+template <class Taken>
+void fill_texture(const GladGLContext& gl, GLuint id, const HostTexture& host, const Taken& taken) {
   const GlFormat& f = gl_format(host);
   const std::int64_t slice = std::int64_t{host.size.x} * host.size.y * f.bytes;
   const int slab = static_cast<int>(std::clamp<std::int64_t>(kMaxBytesPerCall / slice, 1, host.size.z));
   gl.PixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  for (int z = 0; z < host.size.z; z += slab)
-    gl.TextureSubImage3D(id, 0, 0, 0, z, host.size.x, host.size.y, std::min(slab, host.size.z - z), f.format, f.type,
-                         host.data.data() + slice * z);
+  for (int z = 0; z < host.size.z; z += slab) {
+    const int layers = std::min(slab, host.size.z - z);
+    gl.TextureSubImage3D(id, 0, 0, 0, z, host.size.x, host.size.y, layers, f.format, f.type, host.data.data() + slice * z);
+    taken(slice * z, slice * (z + layers));
+  }
 }
 
 std::int64_t reported_texture_bytes(const GladGLContext& gl, GLuint id) {
@@ -151,7 +154,7 @@ std::int64_t reported_texture_bytes(const GladGLContext& gl, GLuint id) {
 
 }  // namespace
 
-GpuField::GpuField(const EncodedField& field, Context& context, const std::function<void(std::size_t)>& uploaded)
+GpuField::GpuField(const EncodedField& field, Context& context, const Uploaded& uploaded)
     : context_(&context), encoding_(field.encoding), integer_uniforms_(field.integer_uniforms) {
   context.make_current();
   try {
@@ -171,52 +174,57 @@ GpuField::GpuField(const EncodedField& field, Context& context, const std::funct
 }
 
 /// Textures first: their handles stand in buffers.
-void GpuField::upload_all(const EncodedField& field, const std::function<void(std::size_t)>& uploaded) {
+void GpuField::upload_all(const EncodedField& field, const Uploaded& uploaded) {
   Handles handles;
   resident_ = ResidentTextures(*context_, std::count_if(field.textures.begin(), field.textures.end(), has_handle));
   for (const bool buffers : {false, true})
     for (std::size_t i = 0; i < field.textures.size(); ++i) {
       const HostTexture& host = field.textures[i];
       if ((host.kind == HostTexture::Kind::buffer) != buffers) continue;
+      const Taken taken = [&](std::int64_t first, std::int64_t last) {
+        if (uploaded) uploaded(i, static_cast<std::size_t>(first), static_cast<std::size_t>(last));
+      };
       const auto words = handles.find(host.name);
       if (has_handle(host))
-        upload_handle(field, host, handles);
+        upload_handle(field, host, handles, taken);
       else if (!buffers)
-        textures_.push_back({host.name, upload_texture(host)});
+        textures_.push_back({host.name, upload_texture(host, taken)});
       else
-        upload_buffer(host, words == handles.end() ? host.data.data() : reinterpret_cast<const std::byte*>(words->second.data()));
-      if (uploaded) uploaded(i);
+        upload_buffer(host, words == handles.end() ? host.data.data() : reinterpret_cast<const std::byte*>(words->second.data()), taken);
     }
 }
 
-void GpuField::upload_handle(const EncodedField& field, const HostTexture& host, Handles& handles) {
-  const std::uint64_t handle = resident_.add(upload_texture(host));
+void GpuField::upload_handle(const EncodedField& field, const HostTexture& host, Handles& handles, const Taken& taken) {
+  const std::uint64_t handle = resident_.add(upload_texture(host, taken));
   std::vector<std::uint32_t>& words = handles[host.handles];
   words.resize(2 * static_cast<std::size_t>(field.find(host.handles)->texels()));
   words[2 * static_cast<std::size_t>(host.handle_index)] = static_cast<std::uint32_t>(handle);
   words[2 * static_cast<std::size_t>(host.handle_index) + 1] = static_cast<std::uint32_t>(handle >> 32);
 }
 
-GlTexture GpuField::upload_texture(const HostTexture& host) {
+GlTexture GpuField::upload_texture(const HostTexture& host, const Taken& taken) {
   const GladGLContext& gl = context_->gl();
   const GlFormat& f = gl_format(host);
   GlTexture texture = make_texture(*context_, GL_TEXTURE_3D);
   gl.TextureStorage3D(texture.id(), 1, f.internal, host.size.x, host.size.y, host.size.z);
   set_sampling(gl, texture.id(), host.hardware_linear);
-  fill_texture(gl, texture.id(), host);
+  fill_texture(gl, texture.id(), host, taken);
   context_->check(fmt::format("uploading texture '{}' of {} texels", host.name, size_text(host.size)));
   bytes_ += std::int64_t{host.size.x} * host.size.y * host.size.z * f.bytes;
   return texture;
 }
 
-void GpuField::upload_buffer(const HostTexture& host, const std::byte* data) {
+void GpuField::upload_buffer(const HostTexture& host, const std::byte* data, const Taken& taken) {
   const GladGLContext& gl = context_->gl();
   gl_format(host);  // refuses formats of the CPU
   GlBuffer buffer = make_buffer(*context_);
   const std::int64_t total = host.bytes();
   gl.NamedBufferStorage(buffer.id(), total, nullptr, GL_DYNAMIC_STORAGE_BIT);
-  for (std::int64_t start = 0; start < total; start += kMaxBytesPerCall)
-    gl.NamedBufferSubData(buffer.id(), start, std::min(kMaxBytesPerCall, total - start), data + start);
+  for (std::int64_t start = 0; start < total; start += kMaxBytesPerCall) {
+    const std::int64_t bytes = std::min(kMaxBytesPerCall, total - start);
+    gl.NamedBufferSubData(buffer.id(), start, bytes, data + start);
+    taken(start, start + bytes);
+  }
   context_->check(fmt::format("uploading buffer '{}' of {} bytes", host.name, total));
   bytes_ += total;
   buffers_.push_back({host.name, host.name + "_block", std::move(buffer)});

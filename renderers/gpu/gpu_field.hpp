@@ -20,8 +20,9 @@ class GpuField {
  public:
   /// Throws UnsupportedError with the numbers, before anything is allocated, where a
   /// limit of the context would be passed; Error where the host data contradicts itself.
-  /// `uploaded`: called with the number of each texture or buffer of the field once the context holds it.
-  GpuField(const EncodedField& field, Context& context, const std::function<void(std::size_t)>& uploaded = {});
+  /// Called with a texture or buffer of the field, by its number, and the bytes of it from `first` to before `last` that the context holds now.
+  using Uploaded = std::function<void(std::size_t texture, std::size_t first, std::size_t last)>;
+  GpuField(const EncodedField& field, Context& context, const Uploaded& uploaded = {});
 
   /// Binds everything that the program uses and sets the field's uniforms. The consumer
   /// binds its own textures and buffers first, each time: throws Error naming what the
@@ -48,10 +49,13 @@ class GpuField {
     GlBuffer object;
   };
 
-  GlTexture upload_texture(const HostTexture& host);
-  void upload_all(const EncodedField& field, const std::function<void(std::size_t)>& uploaded);
-  void upload_handle(const EncodedField& field, const HostTexture& host, Handles& handles);
-  void upload_buffer(const HostTexture& host, const std::byte* data);
+  /// Bytes of one texture or buffer that the context holds now.
+  using Taken = std::function<void(std::int64_t first, std::int64_t last)>;
+
+  void upload_all(const EncodedField& field, const Uploaded& uploaded);
+  void upload_handle(const EncodedField& field, const HostTexture& host, Handles& handles, const Taken& taken);
+  GlTexture upload_texture(const HostTexture& host, const Taken& taken);
+  void upload_buffer(const HostTexture& host, const std::byte* data, const Taken& taken);
 
   Context* context_;
   std::string encoding_;

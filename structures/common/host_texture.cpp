@@ -1,9 +1,12 @@
 #include "structures/common/host_texture.hpp"
 
 #include <fmt/format.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 #include <cassert>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <glm/gtc/packing.hpp>
 
@@ -65,6 +68,18 @@ MemoryByRole& MemoryByRole::operator+=(const MemoryByRole& other) {
   topology += other.topology;
   padding += other.padding;
   return *this;
+}
+
+void give_back(HostTexture& texture, std::size_t first, std::size_t last) {
+  if (last == texture.data.size()) {
+    std::vector<std::byte>().swap(texture.data);  // `= {}` would keep its memory
+    return;
+  }
+  const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
+  const auto data = reinterpret_cast<std::uintptr_t>(texture.data.data());
+  const std::uintptr_t begin = (data + first + page - 1) / page * page;
+  const std::uintptr_t end = (data + last) / page * page;
+  if (begin < end) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_DONTNEED);  // no harm where the system does not
 }
 
 std::string element_name(std::string_view name, int i) { return i == 0 ? std::string(name) : fmt::format("{}[{}]", name, i); }

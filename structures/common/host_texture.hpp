@@ -68,6 +68,10 @@ struct HostTexture {
   }
 };
 
+/// Gives the memory of bytes [first, last) of the data back to the system, as far as it fills whole pages, and all of it with the last
+/// byte. What stood there is lost.
+void give_back(HostTexture& texture, std::size_t first, std::size_t last);
+
 /// Name of element i of an array of textures: `name`, `name[1]`, ...
 std::string element_name(std::string_view name, int i);
 
