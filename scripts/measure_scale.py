@@ -119,18 +119,34 @@ def table(results):
     return lines
 
 
+# two-sided 95 % of Student's t, by degrees of freedom
+STUDENT = {1: 12.71, 2: 4.30, 3: 3.18}
+
+
+def exponent(cells, values):
+    """Slope of log values over log cells, and the half-width of its 95 % interval."""
+    x, y = numpy.log(cells), numpy.log(values)
+    slope, offset = numpy.polyfit(x, y, 1)
+    residual = numpy.sqrt(numpy.sum((y - slope * x - offset) ** 2) / (len(x) - 2) / numpy.sum((x - x.mean()) ** 2))
+    return f"{slope:.2f} ± {STUDENT[len(x) - 2] * residual:.2f}"
+
+
 def exponents(results):
-    """Slopes of log time and bytes over log cells, least squares over all sizes."""
+    """From 10^6 cells on: below, what does not grow with them is the larger part."""
     lines = []
     for name in ENCODINGS:
-        rows = [r for r in results if r["encoding"] == name]
+        rows = [r for r in results if r["encoding"] == name and r["leaf_cells"] > 5e5]
         if len(rows) < 3:
             continue
-        cells = numpy.log([r["leaf_cells"] for r in rows])
-        slope = lambda key: numpy.polyfit(cells, numpy.log([r[key] for r in rows]), 1)[0]
-        lines.append(f"{name}: build grows as n^{slope('build_seconds'):.2f}, file to frame as n^{slope('file_to_frame_seconds'):.2f}, "
-                     f"frame as n^{slope('frame_ms'):.2f}, bytes as n^{slope('encoding_bytes'):.2f}.")
+        of = lambda key: exponent([r["leaf_cells"] for r in rows], [r[key] for r in rows])
+        lines.append(f"{name}, from 10⁶ cells on: build grows as n^({of('build_seconds')}), file to frame as n^({of('file_to_frame_seconds')}), "
+                     f"frame as n^({of('frame_ms')}), bytes as n^({of('encoding_bytes')}).")
     return lines
+
+
+def page(results, repeat):
+    return "\n".join(["# From a file to its first picture", "", *table(results), "", *exponents(results), "",
+                      f"Medians of {repeat} processes. {results[0]['conditions']}. Made by `scripts/measure_scale.py`.", ""])
 
 
 def main():
@@ -149,10 +165,8 @@ def main():
         read_once(data)
         results += [result(row, start_bytes, seconds) for row in first_frames(a.program, data, experiment, a.data, a.repeat)]
         print("\n".join(table(results[-len(ENCODINGS):])), flush=True)
-    text = ["# From a file to its first picture", "", *table(results), "", *exponents(results), "",
-            f"Medians of {a.repeat} processes. {results[0]['conditions']}. Made by `scripts/measure_scale.py`.", ""]
     a.out.mkdir(parents=True, exist_ok=True)
-    (a.out / "first_frame.md").write_text("\n".join(text))
+    (a.out / "first_frame.md").write_text(page(results, a.repeat))
     (a.out / "first_frame.json").write_text(json.dumps(results, indent=1) + "\n")
 
 
