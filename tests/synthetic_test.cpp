@@ -378,14 +378,14 @@ TEST(Refine, GradientFollowsTheDifferenceOverOneCell) {
   EXPECT_TRUE(mesh.patches(3).empty());
 }
 
-// The largest gradient of 4000 places of a box is never above the bound, and within a factor of 5 of it in boxes that are small beside
-// what the field changes over: a bound that is always infinite would leave nothing out.
+// The largest gradient of 4000 places of a box is never above the bound, and within a factor of 5 of it in boxes that are small
+// beside what the field changes over: a bound that is always infinite would leave nothing out.
 TEST(Refine, TheSteepestOfABoxIsABound) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> uniform(0, 1);
   const auto vector = [&] { return Vec3d(uniform(random), uniform(random), uniform(random)); };
-  for (const char* text : {R"({"field": "blobs"})", R"({"field": "shell"})", R"({"field": {"type": "shell", "lobes": 3, "width": 0.05}})",
-                           R"({"field": "blobs_shell"})"}) {
+  for (const char* text : {R"({"field": "blobs"})", R"({"field": "shell"})",
+                           R"({"field": {"type": "shell", "lobes": 3, "width": 0.05}})", R"({"field": "blobs_shell"})"}) {
     const auto field = make_analytic_field(parse(text));
     int tight = 0;
     for (int i = 0; i < 60; ++i) {

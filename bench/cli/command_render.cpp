@@ -234,7 +234,10 @@ void draw(const Arguments& a, Drawn& d, const Scene& drawn, Context& context) {
   const Shown of_mesh = shown(drawn, d.mesh());
   for (const std::string& warning : value_resolution(field, drawn).warnings()) fmt::print(stderr, "warning: {}\n", warning);
   if (a.reference) {
-    write_picture(a, HierarchyReference(d.mesh(), 0, field.definition).render(drawn, reference_rule(d.scene, a.reference_step, a.reference_tolerance)), drawn, of_mesh);
+    write_picture(a,
+                  HierarchyReference(d.mesh(), 0, field.definition)
+                      .render(drawn, reference_rule(d.scene, a.reference_step, a.reference_tolerance)),
+                  drawn, of_mesh);
     return;
   }
   if (!compares(a)) d.give_back_mesh();  // before the context takes as much as the structure has
@@ -249,7 +252,10 @@ void draw(const Arguments& a, Drawn& d, const Scene& drawn, Context& context) {
   const Picture picture = consumer->read();
   if (!a.heat.empty()) {
     const HierarchyReference reference(d.mesh(), 0, structure.field.definition);
-    return write_heat(a, heat, error_picture(picture, reference.render(drawn, reference_rule(d.scene, a.reference_step, a.reference_tolerance))), of_mesh.geometry);
+    return write_heat(
+        a, heat,
+        error_picture(picture, reference.render(drawn, reference_rule(d.scene, a.reference_step, a.reference_tolerance))),
+        of_mesh.geometry);
   }
   if (!a.output.empty()) write_picture(a, picture, drawn, of_mesh);
   if (a.explain_error) {

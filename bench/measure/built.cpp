@@ -24,7 +24,8 @@ std::unique_ptr<Built> build_structure(const Experiment& experiment, const Build
   EncodedField field = encoding.build(mesh, request);
   const double build_seconds = building.seconds();
   const Stopwatch uploading;
-  auto built = std::make_unique<Built>(Built{Structure(context, std::move(field), request, experiment.explain_error ? HostArrays::keep : HostArrays::give_back), build_seconds, 0});
+  const HostArrays arrays = experiment.explain_error ? HostArrays::keep : HostArrays::give_back;
+  auto built = std::make_unique<Built>(Built{Structure(context, std::move(field), request, arrays), build_seconds, 0});
   context.gl().Finish();
   built->upload_seconds = uploading.seconds();
   return built;

@@ -73,8 +73,8 @@ void add_leaps(const EncodedField& field, const Scene& stored, LeapMap map, Scen
   b.define("AMRTEX_LEAPS", has_map ? static_cast<int>(stored.settings.leap) : 0);
   if (!has_map) return;
   const Vec3i& blocks = field.leaps.blocks;
-  b.buffers.push_back(
-      block_map("leap_distances", stored.settings.leap == Leap::octant ? octants(blocks, seen) : chessboard_distances(blocks, seen)));
+  b.buffers.push_back(block_map(
+      "leap_distances", stored.settings.leap == Leap::octant ? octants(blocks, seen) : chessboard_distances(blocks, seen)));
   b.uniforms.push_back({"u_leap_blocks", std::vector<int>{blocks.x, blocks.y, blocks.z}});
   b.set("u_leap_shift", field.leaps.shift);
 }

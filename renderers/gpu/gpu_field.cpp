@@ -190,7 +190,8 @@ void GpuField::upload_all(const EncodedField& field, const Uploaded& uploaded) {
       else if (!buffers)
         textures_.push_back({host.name, upload_texture(host, taken)});
       else
-        upload_buffer(host, words == handles.end() ? host.data.data() : reinterpret_cast<const std::byte*>(words->second.data()), taken);
+        upload_buffer(host, words == handles.end() ? host.data.data() : reinterpret_cast<const std::byte*>(words->second.data()),
+                      taken);
     }
 }
 

@@ -38,7 +38,9 @@ class TrilinearField final : public AnalyticField {
 };
 
 double nearest(const WorldBox& box, const Vec3d& p) { return glm::distance(glm::clamp(p, box.lower, box.upper), p); }
-double farthest(const WorldBox& box, const Vec3d& p) { return glm::length(glm::max(glm::abs(box.lower - p), glm::abs(box.upper - p))); }
+double farthest(const WorldBox& box, const Vec3d& p) {
+  return glm::length(glm::max(glm::abs(box.lower - p), glm::abs(box.upper - p)));
+}
 
 /// Largest of q exp(-q^2 / 2) for q from `from` to `to`, both 0 or more: it rises up to 1 and falls beyond.
 double steepest(double from, double to) {
@@ -108,7 +110,8 @@ class ShellField final : public AnalyticField {
   }
   double steepest_in(const WorldBox& box) const override {
     const double low = nearest(box, s_.center), high = farthest(box, s_.center);
-    const double from = low <= s_.radius && s_.radius <= high ? 0 : std::min(std::abs(low - s_.radius), std::abs(high - s_.radius)) / s_.width;
+    const double from =
+        low <= s_.radius && s_.radius <= high ? 0 : std::min(std::abs(low - s_.radius), std::abs(high - s_.radius)) / s_.width;
     const double to = std::max(std::abs(low - s_.radius), std::abs(high - s_.radius)) / s_.width;
     // around the axis the brightness changes by at most lobes / r, towards it by 1 / r; half of both
     const double brightest = std::exp(-from * from / 2);

@@ -128,7 +128,8 @@ class SampledCriterion final : public RefineCriterion {
     const Vec3d level_cells(grid_.cells(level));
     const auto at = [&](const Vec3i& corner) { return domain_.at(Vec3d(corner) / level_cells); };
     const Vec3i one(1);  // stencils reach a quarter of a cell beyond
-    return score_.most(field_, {at(cells.lower - one), at(cells.upper + one)}, domain_.extent() / level_cells) < (1 - 1e-6) * threshold_;
+    return score_.most(field_, {at(cells.lower - one), at(cells.upper + one)}, domain_.extent() / level_cells) <
+           (1 - 1e-6) * threshold_;
   }
 
   const BlockGrid& grid_;

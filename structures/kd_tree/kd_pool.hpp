@@ -16,7 +16,8 @@ struct PoolPacking {
   int textures = 1;
 };
 
-/// Runs of bricks, as they came, with about as many texels each. Not valid where a run does not fit a texture of `limit` texels an axis.
+/// Runs of bricks, as they came, with about as many texels each. Not valid where a run does not fit a texture of `limit` texels
+/// an axis.
 inline PoolPacking pack_textures(std::span<const Vec3i> bricks, int textures, bool paper, int limit) {
   PoolPacking p;
   p.textures = textures;
@@ -25,7 +26,8 @@ inline PoolPacking pack_textures(std::span<const Vec3i> bricks, int textures, bo
   std::size_t first = 0;
   for (int t = 0; t < textures; ++t) {
     std::size_t last = first;
-    while (last < bricks.size() && (t + 1 == textures || packed * textures < all * (t + 1))) packed += packing::volume(bricks[last++]);
+    while (last < bricks.size() && (t + 1 == textures || packed * textures < all * (t + 1)))
+      packed += packing::volume(bricks[last++]);
     const auto run = bricks.subspan(first, last - first);
     first = last;
     if (run.empty()) continue;
@@ -38,7 +40,8 @@ inline PoolPacking pack_textures(std::span<const Vec3i> bricks, int textures, bo
   return p;
 }
 
-/// The fewest textures that the context takes. Where it takes no number of them: what fits its edges and not its bytes, or nothing valid.
+/// The fewest textures that the context takes. Where it takes no number of them: what fits its edges and not its bytes, or
+/// nothing valid.
 inline PoolPacking pack_pool(const BuildRequest& request, std::span<const Vec3i> bricks, bool paper) {
   const int most = most_pool_textures(request.field_count());
   const auto enough = [&](int textures) {

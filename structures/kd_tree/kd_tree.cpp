@@ -170,7 +170,8 @@ void count_brick(const Options& o, const Plan& p, const Brick& b, TexelCounts& n
 /// Textures of all fields of the pool's first part, then of the second, ...
 void add_pools(const BuildRequest& request, const Options& o, const Plan& p, Layout& layout) {
   std::vector<TexelCounts> counts(static_cast<std::size_t>(p.pool.textures));
-  for (std::size_t i = 0; i < p.bricks.size(); ++i) count_brick(o, p, p.bricks[i], counts[static_cast<std::size_t>(p.pool.texture_of[i])]);
+  for (std::size_t i = 0; i < p.bricks.size(); ++i)
+    count_brick(o, p, p.bricks[i], counts[static_cast<std::size_t>(p.pool.texture_of[i])]);
   int texture = 0;
   for (const TexelCounts& n : counts)
     for (int number = 0; number < request.field_count(); ++number)

@@ -42,7 +42,7 @@ inline bool lay_out(std::int64_t blocks, int edge, int limit, PoolLayout& layout
 
 /// The pool of a field: as few textures as hold its pages, of one size, and as many pages in each.
 struct PagePool {
-  PoolLayout layout;       ///< of a texture
+  PoolLayout layout;  ///< of a texture
   int textures = 1;
   std::int64_t pages = 1;  ///< in a texture; the last one may have fewer
 
@@ -51,8 +51,8 @@ struct PagePool {
   Vec3i position(std::int64_t page) const { return layout.position(page % pages); }
 };
 
-/// False where the pages fit no number of textures with so many texels an axis. What does not fit by its bytes is laid out all the
-/// same, in the most textures: the structure's Layout refuses it with the numbers.
+/// False where the pages fit no number of textures with so many texels an axis. What does not fit by its bytes is laid out all
+/// the same, in the most textures: the structure's Layout refuses it with the numbers.
 inline bool lay_out_pool(const BuildRequest& request, int edge, std::int64_t pages, PagePool& pool) {
   const int most = most_pool_textures(request.field_count());
   bool fits = false;

@@ -25,7 +25,8 @@ using namespace pages;
 constexpr std::array<Filter, 3> kFilters{Filter::nearest, Filter::linear_page, Filter::linear_vertex};
 
 /// Texels of one texture of the pool by role: cells inside the domain, and copies of others.
-MemoryByRole texels_by_role(const AmrHierarchy& h, const Options& o, const std::vector<Page>& pages, const PagePool& pool, int texture) {
+MemoryByRole texels_by_role(const AmrHierarchy& h, const Options& o, const std::vector<Page>& pages, const PagePool& pool,
+                            int texture) {
   MemoryByRole texels;
   for (const Page& p : pages) {
     if (p.kind != AMRTEX_PAGE_STORED || pool.texture_of(p.index) != texture) continue;
@@ -104,9 +105,9 @@ TablePlan plan_table(const AmrHierarchy& h, const BuildRequest& request, const O
 PagePool plan_pool(const BuildRequest& request, const Options& o, std::int64_t stored) {
   PagePool pool;
   if (!lay_out_pool(request, o.edge, stored, pool))
-    throw UnsupportedError(
-        fmt::format("encoding page_table with page_size {}: {} pages of {}^3 texels do not fit {} 3D textures of {} texels an axis",
-                    o.page_size, stored, o.edge, pool.textures, request.context.max_3d_texture_size));
+    throw UnsupportedError(fmt::format(
+        "encoding page_table with page_size {}: {} pages of {}^3 texels do not fit {} 3D textures of {} texels an axis",
+        o.page_size, stored, o.edge, pool.textures, request.context.max_3d_texture_size));
   return pool;
 }
 

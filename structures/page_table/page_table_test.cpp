@@ -124,7 +124,8 @@ TEST(PageTable, IsDividedOverTexturesWhereOneHoldsTooFewPages) {
       EXPECT_EQ(several.statistics["pages"], pages);
       EXPECT_EQ(several.memory().payload, one.memory().payload);
       EXPECT_EQ(several.memory().duplicated, one.memory().duplicated);
-      for (const HostTexture& t : several.textures) EXPECT_TRUE(!t.holds_values || t.bytes() <= limits.max_texture_bytes) << t.name;
+      for (const HostTexture& t : several.textures)
+        EXPECT_TRUE(!t.holds_values || t.bytes() <= limits.max_texture_bytes) << t.name;
       const Comparison result = compare_double(h, several, probe_positions(h, 30));
       EXPECT_TRUE(result) << result;
     }

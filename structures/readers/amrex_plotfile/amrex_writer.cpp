@@ -1,4 +1,5 @@
-// Writes plotfiles: FABs of float32 where all fields of the patch are, else of float64, little endian, `Cell_H` version 1, one data file a level.
+// Writes plotfiles: FABs of float32 where all fields of the patch are, else of float64, little endian, `Cell_H` version 1, one
+// data file a level.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
