@@ -1,7 +1,6 @@
 // What reading a data set takes: seconds and memory, as one line of JSON.
 //   read_data DATA [FIELD]      the first field otherwise
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <chrono>
 #include <fstream>
@@ -16,11 +15,12 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-/// The most memory that the process has held (VmHWM), bytes.
+/// The most memory that the process has held, bytes. Not getrusage(), which begins with that of the process that started this one.
 long peak_bytes() {
-  rusage usage{};
-  ::getrusage(RUSAGE_SELF, &usage);
-  return usage.ru_maxrss * 1024;
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with("VmHWM:")) return 1024 * std::stol(line.substr(6));
+  throw amrtex::Error("/proc/self/status: no line VmHWM");
 }
 
 std::int64_t field_bytes(const amrtex::MeshDescription& mesh) {
