@@ -27,6 +27,12 @@ DEFINE_INT(AMRTEX_LEVEL_OF_DETAIL)     // 1 where refined cells may be drawn in 
 // the same number as kMostPoolTextures (asserted there as well): textures that a field's pool may be divided over
 #define AMRTEX_MOST_POOL_TEXTURES 8
 
+// Runs the statement behind it with t = number. Lanes may be in pages or bricks of different textures, and a context picks a texture by what is
+// the same in all of them: each is asked in turn.
+#define AMRTEX_OF_POOL_TEXTURE(t, number) \
+  for (int t = 0; t < AMRTEX_POOL_TEXTURES; ++t) \
+    if (AMRTEX_POOL_TEXTURES == 1 || t == (number))
+
 #define AMRTEX_NO_RANGE 0xffffffffu  // coded range of a region without mesh
 
 STRUCT Position {

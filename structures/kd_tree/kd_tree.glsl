@@ -243,19 +243,16 @@ void kd_brick_corners(IN(uvec2) brick, IN(ivec3) i, OUT(vec4r) lower, OUT(vec4r)
 #endif
 
 #if AMRTEX_CPP || !AMRTEX_KD_BINDLESS
-// Lanes may be in bricks of different textures, and a context picks a texture by what is the same in all of them: each is asked in turn.
 real kd_pool_texel(IN(uint) number, IN(int) field, IN(ivec3) i) {
   real value = real(0);
-  for (int t = 0; t < AMRTEX_POOL_TEXTURES; ++t)
-    if (AMRTEX_POOL_TEXTURES == 1 || uint(t) == number) value = texelFetch(tex_kd_pool[t * AMRTEX_FIELDS + field], i, 0).x;
+  AMRTEX_OF_POOL_TEXTURE(t, int(number)) value = texelFetch(tex_kd_pool[t * AMRTEX_FIELDS + field], i, 0).x;
   return value;
 }
 
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
 real kd_pool_filtered(IN(uint) number, IN(int) field, IN(vec3r) uvw) {
   real value = real(0);
-  for (int t = 0; t < AMRTEX_POOL_TEXTURES; ++t)
-    if (AMRTEX_POOL_TEXTURES == 1 || uint(t) == number) value = textureLod(tex_kd_pool[t * AMRTEX_FIELDS + field], uvw, 0.0).x;
+  AMRTEX_OF_POOL_TEXTURE(t, int(number)) value = textureLod(tex_kd_pool[t * AMRTEX_FIELDS + field], uvw, 0.0).x;
   return value;
 }
 #endif

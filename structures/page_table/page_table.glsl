@@ -131,21 +131,16 @@ bool page_has_value(IN(Region) r, IN(int) field, IN(ivec3) cell) {
 }
 #endif
 
-int page_texture(IN(Region) r) { return AMRTEX_POOL_TEXTURES > 1 ? int(r.brick.x) : 0; }
-
-// Lanes may be in pages of different textures, and a context picks a texture by what is the same in all of them: each is asked in turn.
 real page_texel(IN(Region) r, IN(int) field, IN(ivec3) texel) {
   real value = real(0);
-  for (int i = 0; i < AMRTEX_POOL_TEXTURES; ++i)
-    if (i == page_texture(r)) value = texelFetch(tex_pages[i * AMRTEX_FIELDS + field], texel, 0).x;
+  AMRTEX_OF_POOL_TEXTURE(t, int(r.brick.x)) value = texelFetch(tex_pages[t * AMRTEX_FIELDS + field], texel, 0).x;
   return value;
 }
 
 #if !AMRTEX_CPP && AMRTEX_HARDWARE_FILTERING
 real page_filtered(IN(Region) r, IN(int) field, IN(vec3r) uvw) {
   real value = real(0);
-  for (int i = 0; i < AMRTEX_POOL_TEXTURES; ++i)
-    if (i == page_texture(r)) value = textureLod(tex_pages[i * AMRTEX_FIELDS + field], uvw, 0.0).x;
+  AMRTEX_OF_POOL_TEXTURE(t, int(r.brick.x)) value = textureLod(tex_pages[t * AMRTEX_FIELDS + field], uvw, 0.0).x;
   return value;
 }
 #endif
