@@ -39,6 +39,39 @@ TEST(CellValues, OfFloatsTakeFourBytesAndAreReadAsDoubles) {
   EXPECT_EQ(CellValues(std::vector<double>{0.1})[0], 0.1);
 }
 
+TEST(CellMemory, HoldsArraysBehindOneAnotherAsLongAsOneOfThemLives) {
+  // 10 doubles take 80 bytes, 128 with what aligns them; 3 such arrays fit, the fourth is on its own
+  auto memory = std::make_shared<CellMemory>(3 * CellMemory::taken(10 * sizeof(double)));
+  EXPECT_EQ(CellMemory::taken(10 * sizeof(double)), 128U);
+  const std::weak_ptr<CellMemory> watched = memory;
+  std::vector<CellValues> arrays;
+  for (int i = 0; i < 4; ++i) {
+    arrays.emplace_back(RealType::float64, std::size_t{10}, memory);
+    for (std::size_t cell = 0; cell < 10; ++cell) arrays.back().set(cell, i);
+  }
+  const auto place = [&](std::size_t i) {
+    return arrays[i].visit_stored([](const auto& stored) { return reinterpret_cast<const std::byte*>(stored.data()); });
+  };
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(memory->holds(place(i)), i < 3);
+    EXPECT_EQ(arrays[i].doubles(), std::vector<double>(10, static_cast<double>(i)));
+  }
+  EXPECT_EQ(place(1) - place(0), 128);
+  const CellValues copy = arrays[1];
+  memory.reset();
+  arrays[0] = std::move(arrays[2]);
+  EXPECT_EQ(arrays[0][9], 2);
+  EXPECT_FALSE(watched.expired());
+  arrays.clear();
+  EXPECT_TRUE(watched.expired()) << "a copy is an array of its own";
+  EXPECT_EQ(copy[9], 1);
+}
+
+TEST(CellMemory, BeyondTheAddressSpaceIsNotThere) {
+  EXPECT_THROW(CellMemory(std::numeric_limits<std::size_t>::max()), std::bad_alloc);
+  EXPECT_THROW(CellMemory(std::size_t{1} << 62), std::bad_alloc);
+}
+
 TEST(CellValues, HoldMeansThatNoFloatHolds) {
   CellValues values(CellArray<float>{1, 2, 3, 4});
   const std::vector<std::uint8_t> mask = {1, 0, 1, 0};

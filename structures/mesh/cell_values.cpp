@@ -14,11 +14,11 @@ CellSet::CellSet(std::span<const std::uint8_t> mask) : words_((mask.size() + 63)
   }
 }
 
-CellValues::CellValues(RealType type, std::size_t cells) {
+CellValues::CellValues(RealType type, std::size_t cells, const std::shared_ptr<CellMemory>& memory) {
   if (type == RealType::float32)
-    values_ = CellArray<float>(cells);
+    values_ = CellArray<float>(cells, UnsetAllocator<float>(memory));
   else
-    values_ = CellArray<double>(cells);
+    values_ = CellArray<double>(cells, UnsetAllocator<double>(memory));
 }
 
 void CellValues::set(std::size_t cell, double value) {

@@ -4,11 +4,15 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <variant>
 #include <vector>
+
+#include "structures/mesh/cell_memory.hpp"
 
 namespace amrtex {
 
@@ -18,13 +22,27 @@ inline const char* name_of(RealType type) { return type == RealType::float32 ? "
 inline std::size_t bytes_of(RealType type) { return type == RealType::float32 ? sizeof(float) : sizeof(double); }
 
 /// Leaves new numbers as they are in memory: whoever asks for an array fills it, and writing it twice costs as much as reading a
-/// file does.
+/// file does. Arrays lie in `memory` where there is one with room, which lives as long as they do.
 template <class T>
-struct UnsetAllocator : std::allocator<T> {
+class UnsetAllocator {
+ public:
+  using value_type = T;
+  using propagate_on_container_move_assignment = std::true_type;
+  using propagate_on_container_swap = std::true_type;
+
+  UnsetAllocator() = default;
+  explicit UnsetAllocator(std::shared_ptr<CellMemory> memory) : memory_(std::move(memory)) {}
   template <class U>
-  struct rebind {
-    using other = UnsetAllocator<U>;
-  };
+  UnsetAllocator(const UnsetAllocator<U>& other) : memory_(other.memory()) {}
+
+  T* allocate(std::size_t count) {
+    if (memory_ && count <= std::numeric_limits<std::size_t>::max() / sizeof(T))
+      if (void* place = memory_->take(count * sizeof(T))) return static_cast<T*>(place);
+    return std::allocator<T>().allocate(count);
+  }
+  void deallocate(T* array, std::size_t count) noexcept {
+    if (!memory_ || !memory_->holds(array)) std::allocator<T>().deallocate(array, count);
+  }
   template <class U>
   void construct(U* at) noexcept {
     ::new (static_cast<void*>(at)) U;
@@ -33,6 +51,13 @@ struct UnsetAllocator : std::allocator<T> {
   void construct(U* at, Args&&... args) {
     ::new (static_cast<void*>(at)) U(std::forward<Args>(args)...);
   }
+  /// Copies are arrays of their own: they need not live as long as the memory's others.
+  UnsetAllocator select_on_container_copy_construction() const { return {}; }
+  const std::shared_ptr<CellMemory>& memory() const { return memory_; }
+  bool operator==(const UnsetAllocator&) const = default;
+
+ private:
+  std::shared_ptr<CellMemory> memory_;
 };
 template <class T>
 using CellArray = std::vector<T, UnsetAllocator<T>>;
@@ -64,8 +89,9 @@ class CellSet {
 /// Reading one number a cell costs a look at the type each time; visit() looks once for all of them.
 class CellValues {
  public:
-  CellValues() = default;                        ///< of no cell
-  CellValues(RealType type, std::size_t cells);  ///< still to be set
+  CellValues() = default;  ///< of no cell
+  /// Still to be set; in `memory` where there is one with room.
+  CellValues(RealType type, std::size_t cells, const std::shared_ptr<CellMemory>& memory = nullptr);
   CellValues(const std::vector<double>& values) : values_(CellArray<double>(values.begin(), values.end())) {}
   CellValues(CellArray<double> values) : values_(std::move(values)) {}
   CellValues(CellArray<float> values) : values_(std::move(values)) {}

@@ -162,13 +162,14 @@ LevelSources locate_level(const PlotHeader& header, std::size_t level) {
   return sources;
 }
 
-std::vector<CellValues> read_components(const FabSource& fab, std::size_t components, const std::vector<std::size_t>& wanted) {
+std::vector<CellValues> read_components(const FabSource& fab, std::size_t components, const std::vector<std::size_t>& wanted,
+                                        const std::shared_ptr<CellMemory>& memory) {
   const DataFile file(fab.file->path);
   const Vec3l size = fab.valid.size();
   const RealType type = fab.format.bytes == 4 ? RealType::float32 : RealType::float64;
   std::vector<CellValues> values;
   for (const std::size_t component : wanted) {
-    values.emplace_back(type, static_cast<std::size_t>(size.x * size.y * size.z));  // the file holds them, so that they fit
+    values.emplace_back(type, static_cast<std::size_t>(size.x * size.y * size.z), memory);  // the file holds them, so that they fit
     values.back().visit_stored([&](auto& out) { read_component(file, fab, components, component, std::span(out)); });
   }
   return values;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -36,7 +37,8 @@ struct LevelSources {
 /// are, else a small file could make us allocate without bound by naming the same bytes many times.
 LevelSources locate_level(const PlotHeader& header, std::size_t level);
 
-/// Reads one array a wanted component, without ghost cells, x fastest.
-std::vector<CellValues> read_components(const FabSource& fab, std::size_t components, const std::vector<std::size_t>& wanted);
+/// Reads one array a wanted component, without ghost cells, x fastest, into `memory`.
+std::vector<CellValues> read_components(const FabSource& fab, std::size_t components, const std::vector<std::size_t>& wanted,
+                                        const std::shared_ptr<CellMemory>& memory);
 
 }  // namespace amrtex

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include <memory>
 #include <new>
 
 #include "structures/readers/amrex_plotfile/amrex_data.hpp"
@@ -16,22 +17,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void read_patch(const FabSource& fab, const IndexBox& domain, std::size_t components, const std::vector<std::size_t>& wanted,
-                Patch& patch) {
-  // the box lies in a domain of at most 2^31 - 1 cells an axis, so that both corners fit
-  patch.box = {Vec3i(fab.valid.lower - domain.lower), Vec3i(fab.valid.upper - domain.lower + std::int64_t{1})};
-  patch.values = read_components(fab, components, wanted);
+/// Of one field.
+CheckedSize bytes_of(const FabSource& fab) {
+  const Vec3l size = fab.valid.size();
+  return CheckedSize(size.x) * size.y * size.z * fab.format.bytes;
 }
 
-/// Of one field.
 CheckedSize bytes_of(const std::vector<LevelSources>& sources) {
   CheckedSize bytes;
   for (const LevelSources& level : sources)
-    for (const FabSource& fab : level.fabs) {
-      const Vec3l size = fab.valid.size();
-      bytes += CheckedSize(size.x) * size.y * size.z * fab.format.bytes;
-    }
+    for (const FabSource& fab : level.fabs) bytes += bytes_of(fab);
   return bytes;
+}
+
+/// For the wanted fields of a level; none for a few small patches. Their bytes were checked before.
+std::shared_ptr<CellMemory> memory_for(const LevelSources& level, std::size_t fields) {
+  constexpr std::size_t kLeast = std::size_t{4} << 20;
+  std::size_t bytes = 0;
+  for (const FabSource& fab : level.fabs) bytes += fields * CellMemory::taken(static_cast<std::size_t>(bytes_of(fab).or_most()));
+  return bytes < kLeast ? nullptr : std::make_shared<CellMemory>(bytes);
 }
 
 void read_levels(const fs::path& path, const PlotHeader& header, const std::vector<LevelSources>& sources,
@@ -41,8 +45,14 @@ void read_levels(const fs::path& path, const PlotHeader& header, const std::vect
     for (std::size_t level = 0; level < sources.size(); ++level) {
       const auto& fabs = sources[level].fabs;
       mesh.levels[level].resize(fabs.size());
-      tbb::parallel_for(std::size_t{0}, fabs.size(), [&](std::size_t patch) {
-        read_patch(fabs[patch], header.domains[level], header.fields.size(), wanted, mesh.levels[level][patch]);
+      const std::shared_ptr<CellMemory> memory = memory_for(sources[level], wanted.size());
+      const IndexBox& domain = header.domains[level];
+      tbb::parallel_for(std::size_t{0}, fabs.size(), [&](std::size_t i) {
+        Patch& patch = mesh.levels[level][i];
+        const IndexBox& box = fabs[i].valid;
+        // the box lies in a domain of at most 2^31 - 1 cells an axis, so that both corners fit
+        patch.box = {Vec3i(box.lower - domain.lower), Vec3i(box.upper - domain.lower + std::int64_t{1})};
+        patch.values = read_components(fabs[i], header.fields.size(), wanted, memory);
       });
     }
   } catch (const std::bad_alloc&) {
