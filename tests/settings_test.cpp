@@ -204,6 +204,14 @@ TEST(SceneKeys, ThatChangeAReferencePictureChangeTheNameOfItsCache) {
   EXPECT_GE(changed, 15) << "the changes are seen at all";
 }
 
+TEST(SceneKeys, ThatRecordsHoldAreColumns) {
+  // else rows that differ in such a key alone read alike
+  std::vector<std::string> without;
+  for (const Key* key : scene_settings().keys())
+    if (key->recorded != Recorded::never && key->column.label.empty()) without.push_back(key->name);
+  EXPECT_THAT(without, testing::UnorderedElementsAre("width", "height")) << "the column `picture` has both";
+}
+
 TEST(SceneKeys, OfViewAndTransferFunctionNameAReferenceToo) {
   const Scene scene = small_scene(Mode::dvr);
   Scene other = scene;

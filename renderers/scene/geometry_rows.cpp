@@ -180,6 +180,7 @@ Rows triangle_rows() {
             "mirrored, and what `point_light` and `ambient_occlusion` light takes no notice of them. In an axis `[]` is none",
         .default_text = "none",
         .recorded = Recorded::where_given,
+        .column = {.label = "triangles", .only_where_given = true},
         .takes = {only_with("output", {"color"}, "triangles are no isosurface"),
                   drawn_by({"raycast"}, "boxes are drawn whole, and rays end at triangles inside of them")}},
        triangles_json,

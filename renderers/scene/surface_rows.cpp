@@ -67,6 +67,7 @@ Rows surface_rows() {
                    .help = "opacity of the surfaces",
                    .default_text = "1",
                    .recorded = Recorded::where_it_applies,
+                   .column = {.label = "opacity of surfaces", .only_where_given = true},
                    .takes = {of_surfaces()}},
                   [](const Scene& s) -> Json {
                     const Isosurfaces& iso = s.settings.isosurfaces;
@@ -94,6 +95,7 @@ Rows surface_color_rows() {
                    .help = "colours over the isovalue or the second field",
                    .default_text = "the transfer function's colours, or grey",
                    .recorded = Recorded::where_it_applies,
+                   .column = {"colours of surfaces"},
                    .takes = {of_surfaces()}},
                   [](const Scene& s) -> Json {
                     const auto& color = s.settings.isosurfaces.color;
@@ -106,6 +108,7 @@ Rows surface_color_rows() {
                    .reference = AffectsReference::yes,
                    .help = "second field of the data set, whose value gives a surface its colour",
                    .recorded = Recorded::where_it_applies,
+                   .column = {"field of colours"},
                    .takes = {of_surfaces()}},
                   [](const Scene& s) -> Json {
                     const std::string& field = s.settings.isosurfaces.color_field;
@@ -123,6 +126,7 @@ Rows surface_light_rows() {
                    .help = "bound on a hit's place along the ray, in widths as `step`",
                    .unit = "cell widths",
                    .recorded = Recorded::where_it_applies,
+                   .column = {.label = "place of hits within (cells)", .numeric = true, .only_where_given = true},
                    .takes = {of_surfaces()}},
                   [](const Scene& s) -> Json { return s.settings.isosurfaces.tolerance; },
                   [](Scene& s, const Json& v) { s.settings.isosurfaces.tolerance = v.get<double>(); }});
@@ -169,6 +173,7 @@ Rows surface_light_rows() {
         .reference = AffectsReference::yes,
         .help = "a surface's colour is multiplied by the share of the rays from a hit that meet no isosurface within the radius",
         .recorded = Recorded::where_given,
+        .column = {"ambient occlusion"},
         .takes = {of_surfaces(), only_with("output", {"color"}, "it darkens colours")}},
        occlusion_json,
        set_occlusion});
@@ -214,6 +219,7 @@ Rows light_rows() {
                    .reference = AffectsReference::yes,
                    .help = "light where the lamp does not reach",
                    .recorded = Recorded::where_it_applies,
+                   .column = {.label = "ambient light", .numeric = true, .only_where_given = true},
                    .takes = {{"point_light", {}, Otherwise::belongs}}},
                   [](const Scene& s) -> Json { return s.settings.point_light.value_or(PointLight{}).ambient; },
                   [](Scene& s, const Json& v) {
@@ -225,6 +231,7 @@ Rows light_rows() {
                    .help = "of the secondary rays, in cells of each region",
                    .unit = "cell widths",
                    .recorded = Recorded::where_it_applies,
+                   .column = {.label = "step to the lamp (cells)", .numeric = true, .only_where_given = true},
                    .takes = {{"point_light", {}, Otherwise::belongs}}},
                   [](const Scene& s) -> Json { return s.settings.point_light.value_or(PointLight{}).shadow_step; },
                   [](Scene& s, const Json& v) {
