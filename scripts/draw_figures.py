@@ -5,10 +5,10 @@
 Figures: structures, filters, data_flow, work_precision; without names all of them.
 """
 import argparse
-import csv
 import json
 import math
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -306,69 +306,32 @@ def draw_arrow(svg, a, b, label):
     svg.text(place[0] + moved[0], place[1] + moved[1], label, 11, INK, anchor)
 
 
-# ---- error against time, from committed results
+# ---- error against time: what `amrtex report` makes of committed results
 
-RESULTS = ROOT / "experiments/work_precision/results/experiment/table.csv"
-
-
-def settings(path=RESULTS):
-    """Measured settings: (time in ms, rmse against the common reference, row). The peak of colours is 1."""
-    with open(path, newline="", encoding="utf-8") as file:
-        rows = [r for r in csv.DictReader(file) if r["status"] == "ok" and r["psnr_common"]]
-    return [(float(r["wall"]), 10 ** (-float(r["psnr_common"]) / 20), r) for r in rows]
+RESULTS = ROOT / "experiments/work_precision/results"
 
 
-def front(points):
-    """Those that no other beats in time and error, the fastest first."""
-    best, kept = math.inf, []
-    for time, error, row in sorted(points, key=lambda p: p[:2]):
-        if error < best:
-            best = error
-            kept.append((time, error, row))
-    return kept
+def report(program):
+    """A folder with the report of the committed records."""
+    folder = program.folder / "report"
+    if not folder.exists():
+        folder.mkdir()
+        for path in (RESULTS / "records.jsonl.gz", RESULTS.parent / "tables.json"):
+            shutil.copy(path, folder)
+        program.run("report", str(folder))
+    return folder
 
 
-def name_of(row):
-    return row["encoding"].split(" ")[0]
+def work_precision(program):
+    plot, = (report(program) / "plots").glob("front_time_*.svg")
+    return plot.read_text(encoding="utf-8")
 
 
-def work_precision(_program):
-    points = settings()
-    svg = Svg(900, 470, "Error against frame time of every setting in one scene")
-    axes = Axes(svg, (70, 20, 660, 380), (3, 300), (2e-5, 4e-2), True, True)
-    axes.frame([(v, str(v)) for v in (5, 10, 20, 50, 100, 200)],
-               [(10 ** -(db / 20), f"{db} dB") for db in (30, 40, 50, 60, 70, 80, 90)], "frame time (ms)", "PSNR")
-    for time, error, row in points:
-        svg.circle(axes.x(time), axes.y(error), 3.2, COLOUR[name_of(row)], opacity=0.55)
-    steps = []
-    for time, error, _ in front(points):
-        if steps:
-            steps.append((axes.x(time), steps[-1][1]))
-        steps.append((axes.x(time), axes.y(error)))
-    svg.polyline(steps, INK, 1.6)
-    for i, (name, colour) in enumerate(COLOUR.items()):
-        svg.circle(756, 40 + 24 * i, 5, colour)
-        svg.text(770, 44 + 24 * i, name, 13)
-    svg.line(748, 40 + 24 * len(COLOUR), 764, 40 + 24 * len(COLOUR), INK, 1.6)
-    svg.text(770, 44 + 24 * len(COLOUR), "beaten by none", 13)
-    svg.text(70, 460, f"{len(points)} settings on blobs_shell (1.7 million leaf cells), 256 × 256 pixels, llvmpipe on 2 cores. "
-             "Down and left is better.", 12, FAINT)
-    return svg
-
-
-def fastest_table(least_db=50.0):
+def fastest_table(program, least_db=50):
     """Markdown: of each encoding the fastest setting that reaches `least_db`."""
-    lines = ["| encoding | filter | storage | step (cells) | memory (MiB) | frame (ms) | PSNR (dB) |",
-             "|---|---|---|---:|---:|---:|---:|"]
-    for name in COLOUR:
-        reached = [p for p in settings() if name_of(p[2]) == name and float(p[2]["psnr_common"]) >= least_db]
-        time, _, r = min(reached, key=lambda p: p[0])
-        size = r["encoding"].partition("page_size ")[2].partition(",")[0]
-        shown = f"`{name}`" + (f", pages of {size}³" if size else "")
-        cells = [shown, f"`{r['filter']}`", r["storage"], f"{float(r['step']):g}",
-                 f"{float(r['total']):.1f}", f"{time:.1f}", f"{float(r['psnr_common']):.1f}"]
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines) + "\n"
+    tables = (report(program) / "table.md").read_text(encoding="utf-8")
+    section = tables.partition(f"the fastest setting of each encoding at {least_db} dB")[2].partition("\n### ")[0]
+    return "".join(line + "\n" for line in section.splitlines() if line.startswith("|"))
 
 
 FIGURES = {f.__name__: f for f in (structures, filters, data_flow, work_precision)}
@@ -384,14 +347,14 @@ def main():
     unknown = [f for f in a.figures if f not in FIGURES]
     if unknown:
         parser.error(f"no figure {unknown[0]}; accepted: {', '.join(FIGURES)}")
-    if a.table:
-        print(fastest_table(), end="")
-        return
-    a.out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         program = Program(a.program, folder)
+        if a.table:
+            print(fastest_table(program), end="")
+            return
+        a.out.mkdir(parents=True, exist_ok=True)
         for name in a.figures or FIGURES:
-            FIGURES[name](program).save(a.out / f"{name}.svg")
+            (a.out / f"{name}.svg").write_text(str(FIGURES[name](program)), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -61,8 +61,8 @@ class Svg:
         self.parts.append(f'<image x="{x:.2f}" y="{y:.2f}" width="{w:.2f}" height="{h:.2f}" preserveAspectRatio="none" '
                           f'style="image-rendering:pixelated" xlink:href="data:image/png;base64,{data}"/>')
 
-    def save(self, path):
-        path.write_text("\n".join(self.parts + ["</svg>", ""]), encoding="utf-8")
+    def __str__(self):
+        return "\n".join(self.parts + ["</svg>", ""])
 
 
 def _points(points):

@@ -938,6 +938,23 @@ TEST_F(CommandLine, TablesBesideAPaperFollowTheOrdinaryOnes) {
   EXPECT_THAT(read_text(at("out") / "table.md"), HasSubstr("### small")) << "the ordinary tables need no tables.json";
 }
 
+TEST_F(CommandLine, CommittedResultsTakeTheTablesAndColumnsOfTheirExperiment) {
+  EXPECT_EQ(counts_of_run(small_experiment()).at("measured"), 3);
+  const Json row{{"label", "memory"}, {"value", "/memory/total_bytes"}, {"paper", 123}};
+  const Json table{{"title", "Table 7"}, {"datasets", "plt00008"}, {"where", {{"/encoding", "uniform"}}}, {"rows", {row}}};
+  const fs::path committed = at("committed"), results = committed / "results/part";
+  fs::create_directories(results);
+  fs::copy_file(at("out") / "records.jsonl", results / "records.jsonl");
+  write_text(committed / "tables.json", Json::array({table}).dump());
+  write_text(committed / "columns.json", R"(["encoding", "total"])");
+  EXPECT_EQ(amrtex({"report", results.string()}).exit_code, 0);
+  EXPECT_THAT(read_text(results / "table.md"), Not(HasSubstr("Table 7"))) << "no experiment above it";
+
+  write_text(committed / "experiment.json", "{}");
+  EXPECT_EQ(amrtex({"report", results.string()}).exit_code, 0);
+  EXPECT_THAT(read_text(results / "table.md"), AllOf(HasSubstr("| encoding | total (MiB) |"), HasSubstr("### Table 7")));
+}
+
 TEST_F(CommandLine, WorkPrecisionIsATableAndADiagram) {
   write_text(at("tables.json"), R"([{"work_precision": {"reach": [20, 200]}}])");
   const Result r = run(small_experiment());

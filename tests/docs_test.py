@@ -163,7 +163,7 @@ class Commands(unittest.TestCase):
 
 class Numbers(unittest.TestCase):
     def test_the_table_of_the_readme_comes_from_committed_results(self):
-        table = draw("--table").stdout
+        table = draw("--program", PROGRAM, "--table").stdout
         self.assertIn("| `octree` |", table)
         self.assertIn(table, (ROOT / "README.md").read_text(encoding="utf-8"), "scripts/draw_figures.sh --table prints it")
 

@@ -17,6 +17,7 @@ using test::cells;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
 using testing::SizeIs;
 
 /// What differs between the records here: a setting, its time and its error.
@@ -135,6 +136,18 @@ TEST_F(WorkPrecisionTest, ShowsWhatEachEncodingNeedsForEachError) {
   EXPECT_THAT(cells(table, "60 dB"), ElementsAre("40", "30"));
   const Table beyond = made(four_settings(), R"([{"work_precision": {"reach": [70]}}])").tables[2];
   EXPECT_THAT(cells(beyond, "70 dB"), ElementsAre("–", "–"));
+}
+
+TEST_F(WorkPrecisionTest, ShowsTheFastestSettingOfEachEncodingWhereItIsAskedFor) {
+  const WorkPrecision result = made(four_settings(), R"([{"work_precision": {"each_at": [30, 70]}}])");
+  ASSERT_THAT(result.tables, SizeIs(5));
+  const Table& at_30 = result.tables[3];
+  EXPECT_EQ(at_30.title, "work-precision: the fastest setting of each encoding at 30 dB, shell, front, ramp, dvr");
+  EXPECT_THAT(cells(at_30, "encoding"), ElementsAre("uniform", "kd_tree")) << "in the order of all tables";
+  EXPECT_THAT(cells(at_30, "storage"), ElementsAre("r32f", "r8"));
+  EXPECT_THAT(cells(at_30, "wall"), ElementsAre("8 ± 0", "3 ± 0"));
+  EXPECT_THAT(result.tables[4].rows, IsEmpty());
+  EXPECT_THAT(result.tables[4].notes, Contains("no setting of kd_tree reaches 70 dB"));
 }
 
 TEST_F(WorkPrecisionTest, CountsAnExactPictureAsReachingEverything) {

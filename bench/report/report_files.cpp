@@ -26,10 +26,28 @@ void write_texts(const fs::path& folder, const std::vector<Table>& tables) {
   write_atomically(folder / "table.tex", latex);
 }
 
+/// A file of the folder, else of the experiment whose results it holds; empty where it is in neither.
+fs::path file_of(const fs::path& folder, const char* name) {
+  if (fs::exists(folder / name)) return folder / name;
+  const fs::path experiment = experiment_of_results(folder);
+  return !experiment.empty() && fs::exists(experiment / name) ? experiment / name : fs::path();
+}
+
 }  // namespace
 
+fs::path experiment_of_results(const fs::path& folder) {
+  std::error_code absent;
+  fs::path above = fs::absolute(folder).lexically_normal();
+  if (above.filename().empty()) above = above.parent_path();
+  for (int steps = 0; steps < 2; ++steps) {
+    above = above.parent_path();
+    if (fs::exists(above / "experiment.json", absent)) return above;
+  }
+  return {};
+}
+
 std::vector<Table> ordinary_tables(const fs::path& folder, fs::path columns, const std::vector<Json>& records) {
-  if (columns.empty() && fs::exists(folder / "columns.json")) columns = folder / "columns.json";
+  if (columns.empty()) columns = file_of(folder, "columns.json");
   ReportOptions options;
   if (!columns.empty())
     for (const Json& r : records)
@@ -39,8 +57,8 @@ std::vector<Table> ordinary_tables(const fs::path& folder, fs::path columns, con
 
 FolderTables asked_tables(const fs::path& folder, const std::vector<Json>& records) {
   FolderTables tables;
-  const fs::path file = folder / "tables.json";
-  if (!fs::exists(file)) return tables;
+  const fs::path file = file_of(folder, "tables.json");
+  if (file.empty()) return tables;
   tables.asked = make_paper_tables(file, records);
   WorkPrecision precision = make_work_precision(file, records);
   tables.asked.insert(tables.asked.end(), precision.tables.begin(), precision.tables.end());

@@ -31,6 +31,7 @@ struct Question {
   bool common = true;              ///< `error_common`, else `error`
   std::vector<double> decibels;    ///< PSNR to be reached
   std::vector<double> tolerances;  ///< errors that 95 % of the pixels may not exceed
+  std::vector<double> each_at;     ///< PSNR at which each encoding shows its fastest setting
   const char* error() const { return common ? "/error_common" : "/error"; }
 };
 
@@ -46,7 +47,7 @@ std::vector<double> numbers(const JsonNode& node, double most) {
 
 Question read_question(const JsonNode& entry) {
   constexpr std::array<std::string_view, 3> entry_keys = {"title", "notes", "work_precision"};
-  constexpr std::array<std::string_view, 3> keys = {"error", "reach", "reach_p95"};
+  constexpr std::array<std::string_view, 4> keys = {"error", "reach", "reach_p95", "each_at"};
   constexpr std::array<std::string_view, 2> errors = {"common", "own"};
   entry.accept_keys(entry_keys);
   Question question;
@@ -59,6 +60,7 @@ Question read_question(const JsonNode& entry) {
   question.decibels = {30, 40, 50, 60};
   if (const auto reach = node.find("reach")) question.decibels = numbers(*reach, kMostDecibels);
   if (const auto reach = node.find("reach_p95")) question.tolerances = numbers(*reach, 1);
+  if (const auto each = node.find("each_at")) question.each_at = numbers(*each, kMostDecibels);
   return question;
 }
 
@@ -179,6 +181,25 @@ Table encodings_table(const Scene& scene, const Question& question) {
     row.insert(row.begin(), encoding);
     table.rows.push_back(std::move(row));
   }
+  return table;
+}
+
+/// One row an encoding: what README.md and papers show. An encoding that reaches the error nowhere has no row but a note.
+Table settings_table(const Scene& scene, const Question& question, double decibels) {
+  const auto points = cost_points(scene.records, question);
+  Records rows;
+  std::vector<std::string> notes = {what_error(scene.records, question.common)};
+  for (const std::string& encoding : encodings_of(scene.records)) {
+    if (const auto fastest = fastest_within(points_of(scene.records, encoding, points), relative_rmse(decibels)))
+      rows.push_back(scene.records[*fastest]);
+    else
+      notes.push_back(fmt::format("no setting of {} reaches {} dB", encoding, decibels));
+  }
+  Table table = make_setting_table(fmt::format("{}: the fastest setting of each encoding at {} dB, {}", question.title, decibels,
+                                               scene.name),
+                                   in_table_order(rows), scene.records, measures_of(question));
+  table.constants.emplace(table.constants.begin(), "renderer", scene.context);
+  table.notes.insert(table.notes.end(), notes.begin(), notes.end());
   return table;
 }
 
@@ -322,6 +343,7 @@ WorkPrecision make_work_precision(const std::filesystem::path& path, std::span<c
       result.tables.push_back(fastest_table(scene, question));
       result.tables.push_back(front_table(scene, question));
       result.tables.push_back(encodings_table(scene, question));
+      for (const double decibels : question.each_at) result.tables.push_back(settings_table(scene, question, decibels));
       if (auto table = unmeasured_table(scene, question)) result.tables.push_back(std::move(*table));
       result.diagrams.push_back({diagram_name("work_precision", scene.name, names), diagram(scene, question)});
     }

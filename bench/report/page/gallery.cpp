@@ -144,14 +144,8 @@ Prose read_prose(const fs::path& readme) {
 }
 
 Prose prose_of_results(const fs::path& folder) {
-  std::error_code absent;
-  fs::path above = fs::absolute(folder).lexically_normal();
-  if (above.filename().empty()) above = above.parent_path();
-  for (int steps = 0; steps < 2; ++steps) {
-    above = above.parent_path();
-    if (fs::exists(above / "experiment.json", absent)) return read_prose(above / "README.md");
-  }
-  return {};
+  const fs::path experiment = experiment_of_results(folder);
+  return experiment.empty() ? Prose{} : read_prose(experiment / "README.md");
 }
 
 ReportPart read_part(const fs::path& folder, std::vector<std::string>& warnings) {
