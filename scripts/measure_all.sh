@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Measures every committed experiment again and writes its results: a table, and the records, compressed. Takes hours; a run that was interrupted
+# Measures every committed experiment again and writes its results: a table, the records, compressed, and small pictures. Takes hours; a run that was interrupted
 # goes on where it stopped.
 #   scripts/measure_all.sh                          all experiments
 #   scripts/measure_all.sh scale limits/octree.json  some, or a file of one
@@ -45,6 +45,9 @@ measure() {
   cp "$target/table.md" "$folder/table.md"
   for diagram in "$target"/*.vl.json; do [ ! -e "$diagram" ] || cp "$diagram" "$folder/"; done
   gzip -9 -n <"$target/records.jsonl" >"$folder/records.jsonl.gz"
+  # small ones of those that a page shows
+  "$program" report "$target" --keep-pictures >>"$target.log" 2>&1
+  [ ! -e "$target/pictures.npz" ] || cp "$target/pictures.npz" "$folder/"
 }
 
 for name in "$@"; do
