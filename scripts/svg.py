@@ -45,11 +45,6 @@ class Svg:
             f'<polyline points="{_points(points)}" fill="none" stroke="{stroke}" stroke-width="{width:g}" '
             f'stroke-linejoin="round"{extra}/>')
 
-    def circle(self, x, y, r, fill=INK, stroke="none", width=1.0, opacity=1.0):
-        self.parts.append(
-            f'<circle cx="{x:.2f}" cy="{y:.2f}" r="{r:g}" fill="{fill}" fill-opacity="{opacity:g}" stroke="{stroke}" '
-            f'stroke-width="{width:g}"/>')
-
     def text(self, x, y, text, size=12, fill=INK, anchor="start", weight="normal", turn=0):
         turned = f' transform="rotate({turn} {x:.2f} {y:.2f})"' if turn else ""
         self.parts.append(f'<text x="{x:.2f}" y="{y:.2f}" font-size="{size}" fill="{fill}" text-anchor="{anchor}" '
@@ -96,19 +91,19 @@ def hex_of(rgb):
 
 
 class Axes:
-    """A plot's frame: from data to pixels, linear or logarithmic."""
+    """A plot's frame: from data to pixels."""
 
-    def __init__(self, svg, box, x_range, y_range, x_log=False, y_log=False):
+    def __init__(self, svg, box, x_range, y_range):
         self.svg, self.box = svg, box
-        self.x_range, self.y_range, self.x_log, self.y_log = x_range, y_range, x_log, y_log
+        self.x_range, self.y_range = x_range, y_range
 
     def x(self, v):
         left, _, width, _ = self.box
-        return left + width * _part(v, self.x_range, self.x_log)
+        return left + width * _part(v, self.x_range)
 
     def y(self, v):
         _, top, _, height = self.box
-        return top + height * (1 - _part(v, self.y_range, self.y_log))
+        return top + height * (1 - _part(v, self.y_range))
 
     def frame(self, x_ticks, y_ticks, x_label, y_label, size=11):
         left, top, width, height = self.box
@@ -124,7 +119,5 @@ class Axes:
             self.svg.text(left - 44, top + height / 2, y_label, size + 1, INK, "middle", turn=-90)
 
 
-def _part(v, ends, logarithmic):
-    if logarithmic:
-        v, ends = math.log10(v), [math.log10(e) for e in ends]
+def _part(v, ends):
     return (v - ends[0]) / (ends[1] - ends[0])

@@ -10,8 +10,8 @@ UNIFORM(int, u_leap_shift)     // log2 of a block's edge, finest cells
 
 // What a ray at p may leap over within the domain: the largest cube of hidden blocks about p's, from p's cell on along the direction;
 // false where p's own may be seen. Of the region it sets the box alone. `forward`: does the ray move up each axis?
-// Leaps overlap, unlike regions. Did a box hold what lies behind the ray, rounding might take the ray back on one axis while it passes a
-// face of another, and two boxes that meet at an edge would send it to and fro for ever.
+// Regions do not overlap; a leap overlaps regions. Did its box hold what lies behind the ray, rounding might take the ray back on one axis while it
+// passes a face of another, and a leap and a region whose faces meet where the ray goes would send it to and fro for ever.
 bool leap(IN(Position) p, IN(bvec3) forward, INOUT(Region) r) {
   ivec3 block = p.cell >> u_leap_shift;
   ivec3 up = ivec3(forward);
