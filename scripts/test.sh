@@ -27,7 +27,7 @@ scripts/count_tests.sh "build/$preset"
 # from Mesa 25 on zink takes handles of textures on the CPU: skipping their tests would hide a defect
 mesa=$(dpkg-query -W -f='${Version}' libgl1-mesa-dri 2>/dev/null || true)
 if [ -n "$mesa" ] && dpkg --compare-versions "$mesa" ge 25; then export AMRTEX_REQUIRE_BINDLESS=1; fi
-if [ $full = yes ]; then export AMRTEX_FULL=1; fi
+if [ $full = yes ]; then export AMRTEX_FULL=1 AMRTEX_BARE_ROOT=1; fi
 
 results=$PWD/build/$preset/tests.xml
 passed=yes

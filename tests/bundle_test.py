@@ -154,7 +154,9 @@ class Bundle(unittest.TestCase):
             subprocess.run(["mmdebstrap", "--variant=minbase", "--include=libegl1,libegl-mesa0,libgl1-mesa-dri", "bookworm", str(root)],
                            check=True, capture_output=True)
             shutil.copytree(self.prefix, root / "opt/amrtex", symlinks=True)
-            inside = ["chroot", str(root), "env", "-i", "HOME=/tmp", "PATH=/usr/bin:/bin"]
+            # with /proc: without it the loader knows no $ORIGIN
+            inside = ["unshare", "--mount", "--pid", "--fork", f"--root={root}", "--mount-proc", "env", "-i", "HOME=/tmp",
+                      "PATH=/usr/bin:/bin"]
             start = time.monotonic()
             done = subprocess.run([*inside, "/opt/amrtex/bin/amrtex", "--version"], capture_output=True, text=True)
             self.assertEqual(done.returncode, 0, done.stderr)
@@ -163,6 +165,10 @@ class Bundle(unittest.TestCase):
                                    "/tmp/tiny.png", "--size", "64", "64"], capture_output=True, text=True)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertGreater((root / "tmp/tiny.png").stat().st_size, 500)
+            done = subprocess.run([*inside, "/opt/amrtex/bin/amrtex", "doctor"], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            for part in ("llvmpipe", "--context egl_device --device 0", "no OSMesa: libOSMesa.so.8"):
+                self.assertIn(part, done.stdout)
 
 
 if __name__ == "__main__":
