@@ -2,10 +2,12 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "structures/mesh/amr_hierarchy.hpp"
+#include "structures/readers/raw_volume/volume_source.hpp"
 
 namespace amrtex {
 
@@ -13,11 +15,11 @@ struct Volume {
   std::string name;  ///< of the data set
   std::string field;
   Vec3i cells{1};
-  Vec3d lower{0};                     ///< world
-  Vec3d spacing{1};                   ///< world, a cell
-  std::vector<double> values;         ///< x fastest
-  RealType type = RealType::float64;  ///< holds each of them exactly
-  std::string unit = {};              ///< of the values; empty where nothing says it
+  Vec3d lower{0};                        ///< world
+  Vec3d spacing{1};                      ///< world, a cell
+  std::unique_ptr<VolumeSource> source;  ///< of the values
+  RealType type = RealType::float64;     ///< holds each of them exactly
+  std::string unit = {};                 ///< of the values; empty where nothing says it
 };
 
 /// When a block becomes coarse. A block of level l is `block` cells of that level along each axis.

@@ -45,8 +45,8 @@ VolumeFile describe(const fs::path& path) {
   throw Error(path.string() + ": no volume; accepted: .raw with shape and type in its name, NRRD, .npy");
 }
 
-Volume load(const fs::path& path, const VolumeFile& file) {
-  return {dataset_name(path),      file.field, file.cells, file.lower, file.spacing, load_values(file),
+Volume open_volume(const fs::path& path, const VolumeFile& file) {
+  return {dataset_name(path),      file.field, file.cells, file.lower, file.spacing, open_values(file),
           real_type_of(file.type), file.unit};
 }
 
@@ -54,12 +54,12 @@ Volume load(const fs::path& path, const VolumeFile& file) {
 
 bool is_raw_volume(const fs::path& path) { return kind_of(path) != Kind::none; }
 
-Volume read_volume(const fs::path& path) { return load(path, describe(path)); }
+Volume read_volume(const fs::path& path) { return open_volume(path, describe(path)); }
 
 MeshDescription read_raw_volume(const fs::path& path, const FieldChoice& fields) {
   const VolumeFile file = describe(path);
   static_cast<void>(fields.among(path, {file.field}));
-  return coarsen_volume(load(path, file));
+  return coarsen_volume(open_volume(path, file));
 }
 
 }  // namespace amrtex

@@ -14,7 +14,7 @@ namespace amrtex {
 /// True for a NRRD header, an array of NumPy, and a file whose name says shape and type, `name_WxHxD_type.raw`.
 bool is_raw_volume(const std::filesystem::path& path);
 
-/// All of a volume, in equal cells.
+/// A volume of equal cells, whose values are read as they are asked for.
 Volume read_volume(const std::filesystem::path& path);
 
 /// A volume as a mesh, by the criterion's defaults. `fields` may name its one field.

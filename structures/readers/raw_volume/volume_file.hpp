@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -10,6 +11,7 @@
 
 #include "structures/mesh/cell_values.hpp"
 #include "structures/mesh/spaces.hpp"
+#include "structures/readers/raw_volume/volume_source.hpp"
 
 namespace amrtex {
 
@@ -45,7 +47,8 @@ VolumeFile describe_npy(const std::filesystem::path& path);
 /// The sizes as a shape, or an Error with the file where one is not from 1 to 2^31 - 1.
 Vec3i volume_shape(const std::filesystem::path& path, const std::vector<std::int64_t>& sizes);
 
-/// All values, x fastest. The sizes of files are held against what they should be before memory is asked for.
-std::vector<double> load_values(const VolumeFile& file);
+/// The values, as they are asked for; packed ones are unpacked here, all of them. The sizes of files are held against what they
+/// should be before memory is asked for.
+std::unique_ptr<VolumeSource> open_values(const VolumeFile& file);
 
 }  // namespace amrtex
