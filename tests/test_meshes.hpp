@@ -1,13 +1,12 @@
 // Meshes that tests alone need, beside those of bench/verify/meshes.hpp.
 #pragma once
 
-#include <sys/resource.h>
-
 #include <cmath>
 #include <string>
 #include <vector>
 
 #include "bench/verify/meshes.hpp"
+#include "structures/mesh/process_memory.hpp"
 
 namespace amrtex::test {
 
@@ -55,12 +54,8 @@ inline AmrHierarchy two_cells_far_apart() {
       .hierarchy();
 }
 
-/// Most memory that this process ever held.
-inline std::int64_t peak_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return std::int64_t{1024} * usage.ru_maxrss;
-}
+/// Most bytes that this process ever held.
+inline std::int64_t peak_bytes() { return process_peak_bytes().value(); }
 
 struct NamedMesh {
   std::string name;

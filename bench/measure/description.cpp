@@ -4,6 +4,7 @@
 
 #include "bench/measure/environment.hpp"
 #include "bench/records/record.hpp"
+#include "structures/mesh/process_memory.hpp"
 
 namespace amrtex {
 namespace {

@@ -54,14 +54,6 @@ std::optional<std::string> cpu_name() {
   return std::nullopt;
 }
 
-std::optional<std::int64_t> process_peak_bytes() {
-  std::ifstream in("/proc/self/status");
-  constexpr std::string_view key = "VmHWM:";
-  for (std::string line; std::getline(in, line);)
-    if (line.starts_with(key)) return std::stoll(line.substr(key.size())) * 1024;  // in kB, as the system calls them
-  return std::nullopt;
-}
-
 Json driver_variables() {
   std::vector<std::pair<std::string, std::string>> variables;
   for (char** entry = environ; entry != nullptr && *entry != nullptr; ++entry) {

@@ -25,9 +25,6 @@ std::string implementation_hash();
 /// Name of the processor; absent where the system does not say.
 std::optional<std::string> cpu_name();
 
-/// Most bytes that this process has held in memory; absent where the system does not say.
-std::optional<std::int64_t> process_peak_bytes();
-
 /// The variables that choose or tune a GL driver, by name: MESA_*, LP_*, GALLIUM_*, LIBGL_*, EGL_*, VK_*, ZINK_*; without the
 /// folder of compiled shaders, which each run has for itself.
 Json driver_variables();

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <fstream>
 #include <string>
 
 #include "structures/mesh/amr_hierarchy.hpp"
+#include "structures/mesh/process_memory.hpp"
 #include "structures/readers/mesh_io.hpp"
 
 namespace {
@@ -15,12 +15,9 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-/// The most memory that the process has held, bytes. Not getrusage(), which begins with that of the process that started this one.
-long peak_bytes() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);)
-    if (line.starts_with("VmHWM:")) return 1024 * std::stol(line.substr(6));
-  throw amrtex::Error("/proc/self/status: no line VmHWM");
+std::int64_t peak_bytes() {
+  if (const auto bytes = amrtex::process_peak_bytes()) return *bytes;
+  throw amrtex::Error("the system does not say how much memory a process holds");
 }
 
 std::int64_t field_bytes(const amrtex::MeshDescription& mesh) {
@@ -39,12 +36,12 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
-    const long before = peak_bytes();
+    const std::int64_t before = peak_bytes();
     const Clock::time_point start = Clock::now();
     amrtex::MeshDescription read = amrtex::read_mesh(argv[1], amrtex::FieldChoice::one(argc > 2 ? argv[2] : ""));
     const double read_seconds = seconds_since(start);
     const std::int64_t bytes = field_bytes(read);
-    const long read_peak = peak_bytes();
+    const std::int64_t read_peak = peak_bytes();
     const Clock::time_point built = Clock::now();
     const amrtex::AmrHierarchy mesh(std::move(read));
     fmt::print(
