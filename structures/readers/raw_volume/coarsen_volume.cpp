@@ -286,10 +286,9 @@ void add_parts(const Box& box, std::vector<Patch>& patches) {
 
 /// One piece for the values of a level; none for a few small patches.
 std::shared_ptr<CellMemory> memory_for(const std::vector<Patch>& patches, RealType type) {
-  constexpr std::size_t kLeast = std::size_t{4} << 20;
   std::size_t bytes = 0;
   for (const Patch& patch : patches) bytes += CellMemory::taken(static_cast<std::size_t>(patch.box.cells()) * bytes_of(type));
-  return bytes < kLeast ? nullptr : std::make_shared<CellMemory>(bytes);
+  return CellMemory::for_arrays(bytes);
 }
 
 /// Patches over blocks of a level.

@@ -13,6 +13,7 @@
 
 #include "structures/mesh/cell_memory.hpp"
 #include "structures/mesh/quoted.hpp"
+#include "structures/readers/data_file.hpp"
 #include "structures/readers/memory_check.hpp"
 #include "structures/readers/raw_volume/volume_file.hpp"
 #include "structures/readers/reader_tools.hpp"
@@ -30,37 +31,17 @@ constexpr std::size_t kPieceBytes = std::size_t{8} << 20;  // a multiple of ever
   throw Error(fmt::format("{}: {}", path.string(), what));
 }
 
-[[noreturn]] void refuse_end(const fs::path& path) { refuse(path, "ends before its last value"); }
-
-/// A file that is open for reading.
-class OpenFile {
- public:
-  explicit OpenFile(const fs::path& path) : descriptor_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
-    if (descriptor_ < 0) refuse(path, reason_of({errno, std::generic_category()}));
-  }
-  ~OpenFile() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
-
-  int descriptor() const { return descriptor_; }
-  /// Whoever takes it closes it.
-  void release() { descriptor_ = -1; }
-
- private:
-  int descriptor_;
-};
-
 /// Unpacked bytes, one after the other.
 class PackedStream {
  public:
   explicit PackedStream(const VolumeFile& file) : file_(file) {
-    OpenFile opened(file.data);
-    ::lseek(opened.descriptor(), static_cast<off_t>(file.offset), SEEK_SET);
-    packed_ = ::gzdopen(opened.descriptor(), "rb");
-    if (packed_ == nullptr) refuse(file.data, "not enough memory to unpack it");
-    opened.release();
+    const int descriptor = ::open(file.data.c_str(), O_RDONLY | O_CLOEXEC);
+    if (descriptor < 0) refuse(file.data, reason_of({errno, std::generic_category()}));
+    ::lseek(descriptor, static_cast<off_t>(file.offset), SEEK_SET);
+    packed_ = ::gzdopen(descriptor, "rb");
+    if (packed_ != nullptr) return;
+    ::close(descriptor);
+    refuse(file.data, "not enough memory to unpack it");
   }
   ~PackedStream() { ::gzclose(packed_); }
   PackedStream(const PackedStream&) = delete;
@@ -69,7 +50,7 @@ class PackedStream {
   void read_exactly(std::byte* out, std::size_t bytes) {
     for (std::size_t done = 0; done < bytes;) {
       const std::size_t got = read(out + done, bytes - done);
-      if (got == 0) refuse_end(file_.data);
+      if (got == 0) refuse(file_.data, "ends before its last value");
       done += got;
     }
   }
@@ -155,7 +136,7 @@ class PlainValues final : public VolumeSource {
     std::array<std::byte, kReadBytes> block;
     while (!out.empty()) {
       const std::size_t part = std::min(out.size(), block.size() / width);
-      read_exactly(begin_ + first * width, block.data(), part * width);
+      opened_.read(begin_ + first * width, block.data(), part * width);
       decode(file_, block.data(), out.first(part));
       out = out.subspan(part);
       first += part;
@@ -163,20 +144,8 @@ class PlainValues final : public VolumeSource {
   }
 
  private:
-  void read_exactly(std::uint64_t offset, std::byte* out, std::size_t bytes) const {
-    while (bytes > 0) {
-      const ssize_t got = ::pread(opened_.descriptor(), out, bytes, static_cast<off_t>(offset));
-      if (got < 0 && errno == EINTR) continue;
-      if (got < 0) refuse(file_.data, reason_of({errno, std::generic_category()}));
-      if (got == 0) refuse_end(file_.data);
-      out += got;
-      offset += static_cast<std::uint64_t>(got);
-      bytes -= static_cast<std::size_t>(got);
-    }
-  }
-
   VolumeFile file_;
-  OpenFile opened_;
+  DataFile opened_;
   std::uint64_t begin_;
 };
 
