@@ -3,10 +3,10 @@
 
     scripts/measure_readers.py PROGRAM [--megabytes 400] [--pairs 7] [--folder DIR] [--formats amrex chombo ...]
 
-PROGRAM is `read_data` of the build. The control reads the same bytes into fresh memory of the same size: the data files of a plotfile and
-raw volumes with as many threads, in pieces; packed volumes with zlib; HDF5 data sets with h5py. A table comes out: the medians, their
-ratio, and the memory that the process took beyond its start beside the field in the file's type; of a volume beside all its cells in the
-type that holds its values, where the mesh has fewer.
+PROGRAM is `read_data` of the build. The control reads the same bytes into fresh memory of the same size: the data files of a plotfile or an
+ExaBrick data set and raw volumes with as many threads, in pieces; packed volumes with zlib; HDF5 data sets with h5py. A table comes out: the
+medians, their ratio, and the memory that the process took beyond its start beside the field in the file's type; of a volume beside all its
+cells in the type that holds its values, where the mesh has fewer.
 """
 
 import argparse
@@ -172,6 +172,30 @@ def write_volume(path, levels, dtype, fields, packed=False, still=0):
     return file
 
 
+def write_exabrick(path, levels, dtype, fields, bricks):
+    """Leaves alone, in blocks of 16 x 16 x 16, coarse ones first; each block is a brick."""
+    random = numpy.random.default_rng(1)
+    path.mkdir()
+    block = 16
+    steps = numpy.stack(numpy.meshgrid(*(range(block),) * 3, indexing="ij")[::-1], -1).reshape(-1, 3)
+    count = 0
+    with open(path / ("m.bricks" if bricks else "m.cells"), "wb") as out, open(path / "m.scalars", "wb") as scalars:
+        for number, (cells, boxes) in enumerate(levels):
+            level = len(levels) - 1 - number
+            refined = 0 if level == 0 else cells // 2
+            for lo in boxes:
+                if max(lo) < refined:
+                    continue
+                for at in (numpy.array(lo) + block * numpy.array((x, y, z)) for z in (0, 1) for y in (0, 1) for x in (0, 1)):
+                    if bricks:
+                        numpy.array((block, block, block, *(at << level), level), "<i4").tofile(out)
+                        numpy.arange(count, count + block**3, dtype="<i4").tofile(out)
+                    else:
+                        numpy.insert((at + steps) << level, 3, level, axis=1).astype("<i4").tofile(out)
+                    values(random, dtype, block**3).tofile(scalars)
+                    count += block**3
+
+
 def read_pieces(path, offset, count):
     fresh = numpy.empty(count, numpy.uint8)
     with open(path, "rb", buffering=0) as file:
@@ -226,7 +250,7 @@ def measure(program, path, control, pairs):
 
 
 CASES = {
-    # name: (writer, type, fields, options, bound of the ratio)
+    # name: (writer, type, fields, options, bound of the ratio; None: the control does not do what costs the reader its time)
     "amrex f8": (write_amrex, "f8", 1, {}, 1.5),
     "amrex f4": (write_amrex, "f4", 1, {}, 1.5),
     "chombo f8": (write_chombo, "f8", 1, {}, 2),
@@ -238,13 +262,17 @@ CASES = {
     "raw f4": (write_volume, "f4", 1, {"still": 128}, None),
     "raw u1": (write_volume, "u1", 1, {"still": 128}, None),
     "nrrd f4 gzip": (write_volume, "f4", 1, {"packed": True}, 2),
+    # nor does one put single cells into their places
+    "exabrick cells f4": (write_exabrick, "f4", 1, {"bricks": False}, None),
+    "exabrick bricks f4": (write_exabrick, "f4", 1, {"bricks": True}, None),
 }
+FILES = {"amrex": "Level_*/Cell_D_*", "exabrick": "m.*"}
 WANTED = {"chombo": lambda n: n.endswith("data:datatype=0"), "flash": lambda n: n == "f000", "enzo": lambda n: n.endswith("/f0"), "vtkhdf": lambda n: n.endswith("CellData/f0")}
 
 
 def control_for(kind, path, threads):
-    if kind == "amrex":
-        return lambda: control_files(path.glob("Level_*/Cell_D_*"), threads)
+    if kind in FILES:
+        return lambda: control_files(path.glob(FILES[kind]), threads)
     if kind == "raw":
         return lambda: control_files([path], threads)
     if kind == "nrrd":

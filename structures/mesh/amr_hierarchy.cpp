@@ -8,7 +8,6 @@
 #include <cmath>
 #include <utility>
 
-#include "structures/mesh/patch_index.hpp"
 #include "structures/mesh/quoted.hpp"
 
 namespace amrtex {
@@ -20,6 +19,72 @@ constexpr std::int64_t kMaxIndex = std::numeric_limits<std::int32_t>::max() - 40
 
 std::string text(const Vec3i& v) { return fmt::format("({}, {}, {})", v.x, v.y, v.z); }
 std::string text(const Box& b) { return fmt::format("[{}, {})", text(b.lower), text(b.upper)); }
+
+/// Patches of one level by bins over their common bounding box: constant-time look-up.
+class PatchIndex {
+ public:
+  explicit PatchIndex(std::span<const Patch> patches) {
+    if (patches.empty()) return;
+    bounds_ = patches[0].box;
+    double edges = 0;
+    for (const Patch& p : patches) {
+      bounds_ = {glm::min(bounds_.lower, p.box.lower), glm::max(bounds_.upper, p.box.upper)};
+      edges += std::cbrt(static_cast<double>(p.box.cells()));
+    }
+    bin_ = static_cast<int>(std::clamp(edges / static_cast<double>(patches.size()), 1.0, static_cast<double>(kWidestBin)));
+    while (too_many_bins(patches)) bin_ *= 2;
+    fill(patches);
+  }
+
+  template <class F>
+  void for_candidates(const Box& box, F&& f) const {
+    const Box inside = intersection(box, bounds_);
+    if (inside.empty()) return;
+    const Box bins = inside.shifted(-bounds_.lower).coarsened(bin_);
+    for_each_cell(bins, [&](const Vec3i& b) {
+      const std::size_t i = Box{Vec3i(0), bins_}.offset(b);
+      for (std::uint32_t k = first_[i]; k < first_[i + 1]; ++k) f(patch_[k]);
+    });
+  }
+
+  int find(std::span<const Patch> patches, const Vec3i& cell) const {
+    if (!bounds_.contains(cell)) return -1;
+    const std::size_t i = Box{Vec3i(0), bins_}.offset((cell - bounds_.lower) / bin_);
+    for (std::uint32_t k = first_[i]; k < first_[i + 1]; ++k)
+      if (patches[static_cast<std::size_t>(patch_[k])].box.contains(cell)) return patch_[k];
+    return -1;
+  }
+
+ private:
+  Box bins_of(const Box& box) const { return box.shifted(-bounds_.lower).coarsened(bin_); }
+
+  bool too_many_bins(std::span<const Patch> patches) {
+    bins_ = ceil_div(bounds_.size(), bin_);
+    if (Box{Vec3i(0), bins_}.cells() > (std::int64_t{1} << 22)) return true;
+    CheckedSize entries;
+    for (const Patch& p : patches) entries += bins_of(p.box).cells();
+    return entries.or_most() > 16 * std::ssize(patches) + 4096;
+  }
+
+  void fill(std::span<const Patch> patches) {
+    const Box all{Vec3i(0), bins_};
+    first_.assign(static_cast<std::size_t>(all.cells()) + 1, 0);
+    for (const Patch& p : patches) for_each_cell(bins_of(p.box), [&](const Vec3i& b) { ++first_[all.offset(b) + 1]; });
+    for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
+    patch_.resize(first_.back());
+    std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+    for (std::size_t k = 0; k < patches.size(); ++k)
+      for_each_cell(bins_of(patches[k].box), [&](const Vec3i& b) { patch_[next[all.offset(b)]++] = static_cast<int>(k); });
+  }
+
+  static constexpr int kWidestBin = 1 << 30;  // eight of them hold any mesh of 31 bits
+
+  Box bounds_;
+  Vec3i bins_{0};
+  int bin_ = 1;
+  std::vector<std::uint32_t> first_;
+  std::vector<int> patch_;
+};
 
 struct Mean {
   double sum = 0;

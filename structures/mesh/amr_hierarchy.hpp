@@ -10,11 +10,17 @@
 #include <string>
 #include <vector>
 
+#include "structures/mesh/cell_values.hpp"
 #include "structures/mesh/error.hpp"
-#include "structures/mesh/patch.hpp"
 #include "structures/mesh/spaces.hpp"
 
 namespace amrtex {
+
+/// A rectangular block of cells of one level as the simulation wrote it, ghost cells stripped.
+struct Patch {
+  Box box;                         ///< level space
+  std::vector<CellValues> values;  ///< one array a field, box.cells() values each, x fastest
+};
 
 /// What a reader or generator hands over. Level 0 is the coarsest.
 struct MeshDescription {

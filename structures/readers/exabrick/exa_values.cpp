@@ -12,7 +12,7 @@
 #include <span>
 
 #include "structures/mesh/error.hpp"
-#include "structures/mesh/patch_index.hpp"
+#include "structures/readers/exabrick/patch_tree.hpp"
 
 namespace amrtex {
 namespace {
@@ -59,7 +59,7 @@ class ValueReader {
     for (const ExaField& field : fields) scalars_.push_back(std::make_unique<DataFile>(field.scalars));
     for (std::size_t l = 0; l < levels.size(); ++l) {
       allocate(levels[l]);
-      index_.emplace_back(levels[l]);
+      trees_.emplace_back(levels[l]);
       first_patch_.push_back(l == 0 ? 0 : first_patch_[l - 1] + static_cast<std::uint32_t>(levels[l - 1].size()));
     }
     arrays_.resize(fields.size());
@@ -135,7 +135,7 @@ class ValueReader {
     const std::vector<Patch>& patches = levels_[level];
     Vec3i cell = grid_.place(run.first);
     for (std::uint32_t done = 0; done < run.count;) {
-      if (patch < 0 || !patches[static_cast<std::size_t>(patch)].box.contains(cell)) patch = index_[level].find(patches, cell);
+      if (patch < 0 || !patches[static_cast<std::size_t>(patch)].box.contains(cell)) patch = trees_[level].find(cell);
       if (patch < 0) throw Error(fmt::format("{}: changed while it was read", file_.path().string()));
       const Box& box = patches[static_cast<std::size_t>(patch)].box;
       const std::uint32_t count = std::min(run.count - done, static_cast<std::uint32_t>(box.upper.x - cell.x));
@@ -178,7 +178,7 @@ class ValueReader {
   const ExaGrid& grid_;
   std::vector<std::vector<Patch>>& levels_;
   std::vector<std::unique_ptr<DataFile>> scalars_;
-  std::vector<PatchIndex> index_;            // a level
+  std::vector<PatchTree> trees_;             // a level
   std::vector<std::uint32_t> first_patch_;   // a level
   std::vector<std::vector<float*>> arrays_;  // field, patch of all levels
   tbb::enumerable_thread_specific<Buffer> buffers_;
