@@ -42,10 +42,14 @@ std::vector<Box> boxes_of_cells(std::span<const Vec3i> cells) {
     else
       boxes.push_back({cell, cell + Vec3i(1)});
   }
-  join_along(1, boxes);
-  join_along(2, boxes);
-  tbb::parallel_sort(boxes.begin(), boxes.end(), [](const Box& p, const Box& q) { return array_order(p.lower, q.lower); });
-  return boxes;
+  return boxes_of_runs(std::move(boxes));
+}
+
+std::vector<Box> boxes_of_runs(std::vector<Box> runs) {
+  join_along(1, runs);
+  join_along(2, runs);
+  tbb::parallel_sort(runs.begin(), runs.end(), [](const Box& p, const Box& q) { return array_order(p.lower, q.lower); });
+  return runs;
 }
 
 }  // namespace amrtex

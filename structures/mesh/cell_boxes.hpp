@@ -15,4 +15,7 @@ inline bool array_order(const Vec3i& a, const Vec3i& b) { return a.z != b.z ? a.
 /// rectangles where they fit, which become boxes.
 std::vector<Box> boxes_of_cells(std::span<const Vec3i> cells);
 
+/// The same of runs: rows of cells along x, in any order, that do not meet.
+std::vector<Box> boxes_of_runs(std::vector<Box> runs);
+
 }  // namespace amrtex

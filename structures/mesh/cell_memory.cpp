@@ -33,6 +33,11 @@ CellMemory::CellMemory(std::size_t bytes) : mapped_bytes_(with_alignment(bytes))
 
 CellMemory::~CellMemory() { ::munmap(mapped_, mapped_bytes_); }
 
+std::shared_ptr<CellMemory> CellMemory::for_arrays(std::size_t bytes) {
+  constexpr std::size_t kLeast = std::size_t{4} << 20;
+  return bytes < kLeast ? nullptr : std::make_shared<CellMemory>(bytes);
+}
+
 void* CellMemory::take(std::size_t bytes) noexcept {
   if (bytes == 0 || bytes > bytes_) return nullptr;
   const std::size_t count = taken(bytes);

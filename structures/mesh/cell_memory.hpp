@@ -3,16 +3,19 @@
 
 #include <atomic>
 #include <cstddef>
+#include <memory>
 
 namespace amrtex {
 
-/// Arrays of a level's patches lie behind one another here. Asked of the system one by one, each is mapped in small pages while other
-/// threads wait; one piece in huge pages (where the system has them) takes a fraction of that time. Given back as a whole.
+/// Arrays of a level's patches lie behind one another here. Asked of the system one by one, each is mapped in small pages while
+/// other threads wait; one piece in huge pages (where the system has them) takes a fraction of that time. Given back as a whole.
 class CellMemory {
  public:
   /// Throws std::bad_alloc.
   explicit CellMemory(std::size_t bytes);
   ~CellMemory();
+  /// Of so many bytes; null where that is little, so that arrays are asked of the system. Throws std::bad_alloc.
+  static std::shared_ptr<CellMemory> for_arrays(std::size_t bytes);
   CellMemory(const CellMemory&) = delete;
   CellMemory& operator=(const CellMemory&) = delete;
 

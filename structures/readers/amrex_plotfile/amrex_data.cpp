@@ -1,18 +1,16 @@
 #include "structures/readers/amrex_plotfile/amrex_data.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <limits>
 #include <optional>
 #include <span>
 
 #include "structures/mesh/quoted.hpp"
+#include "structures/readers/data_file.hpp"
 
 namespace amrtex {
 namespace {
@@ -21,34 +19,6 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kFabLineBytes = 1024;                   // the longest line that AMReX writes has some 200
 constexpr std::uint64_t kReadBytes = std::uint64_t{1} << 20;  // read at a time and thread, or one row where that is longer
-
-/// A data file opened for reads at any position, from any thread.
-class DataFile {
- public:
-  explicit DataFile(const fs::path& path) : path_(path.string()), descriptor_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
-    if (descriptor_ < 0) throw Error(fmt::format("{}: {}", path_, reason_of({errno, std::generic_category()})));
-  }
-  ~DataFile() { ::close(descriptor_); }
-  DataFile(const DataFile&) = delete;
-  DataFile& operator=(const DataFile&) = delete;
-
-  void read(std::uint64_t offset, std::byte* out, std::size_t bytes) const {
-    while (bytes > 0) {
-      const ssize_t got = ::pread(descriptor_, out, bytes, static_cast<off_t>(offset));
-      if (got < 0 && errno == EINTR) continue;
-      if (got <= 0)
-        throw Error(fmt::format("{}: {} bytes at {} cannot be read: {}", path_, bytes, offset,
-                                got < 0 ? reason_of({errno, std::generic_category()}) : "the file ends"));
-      out += got;
-      offset += static_cast<std::uint64_t>(got);
-      bytes -= static_cast<std::size_t>(got);
-    }
-  }
-
- private:
-  std::string path_;
-  int descriptor_;
-};
 
 /// Reads the FAB line in front of the values, checks that it is the patch that `Cell_H` means.
 void scan_fab_line(FabSource& fab, const DataFile& file, std::uint64_t offset, const PlotHeader& header) {
@@ -169,7 +139,8 @@ std::vector<CellValues> read_components(const FabSource& fab, std::size_t compon
   const RealType type = fab.format.bytes == 4 ? RealType::float32 : RealType::float64;
   std::vector<CellValues> values;
   for (const std::size_t component : wanted) {
-    values.emplace_back(type, static_cast<std::size_t>(size.x * size.y * size.z), memory);  // the file holds them, so that they fit
+    values.emplace_back(type, static_cast<std::size_t>(size.x * size.y * size.z),
+                        memory);  // the file holds them, so that they fit
     values.back().visit_stored([&](auto& out) { read_component(file, fab, components, component, std::span(out)); });
   }
   return values;

@@ -32,10 +32,9 @@ CheckedSize bytes_of(const std::vector<LevelSources>& sources) {
 
 /// For the wanted fields of a level; none for a few small patches. Their bytes were checked before.
 std::shared_ptr<CellMemory> memory_for(const LevelSources& level, std::size_t fields) {
-  constexpr std::size_t kLeast = std::size_t{4} << 20;
   std::size_t bytes = 0;
   for (const FabSource& fab : level.fabs) bytes += fields * CellMemory::taken(static_cast<std::size_t>(bytes_of(fab).or_most()));
-  return bytes < kLeast ? nullptr : std::make_shared<CellMemory>(bytes);
+  return CellMemory::for_arrays(bytes);
 }
 
 void read_levels(const fs::path& path, const PlotHeader& header, const std::vector<LevelSources>& sources,
