@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <fstream>
 #include <random>
+#include <tuple>
 
 #include "structures/generators/random_mesh.hpp"
 #include "structures/mesh/cell_boxes.hpp"
@@ -250,6 +252,192 @@ TEST(CellBoxes, OfABoxAreOne) {
   for_each_cell({{1, 2, 3}, {5, 9, 4}}, [&](const Vec3i& c) { cells.push_back(c); });
   EXPECT_THAT(boxes_of_cells(cells), ElementsAre(Box{{1, 2, 3}, {5, 9, 4}}));
   EXPECT_TRUE(boxes_of_cells({}).empty());
+}
+
+TEST(CellBoxes, OfRunsAreThoseOfTheirCells) {
+  std::mt19937 random(4);
+  for (int turn = 0; turn < 20; ++turn) {
+    std::vector<Vec3i> cells;
+    std::vector<Box> runs;
+    for_each_cell({Vec3i(0), Vec3i(9, 4, 4)}, [&](const Vec3i& c) {
+      if (random() % 4 == 0) return;
+      cells.push_back(c);
+      if (!runs.empty() && runs.back().upper == c + Vec3i(0, 1, 1))
+        ++runs.back().upper.x;
+      else
+        runs.push_back({c, c + Vec3i(1)});
+    });
+    std::shuffle(runs.begin(), runs.end(), random);
+    EXPECT_EQ(boxes_of_runs(runs), boxes_of_cells(cells)) << "turn " << turn;
+  }
+}
+
+// ---- against single cells ----
+
+struct Leaf {
+  Vec3i lower;  // finest cells of the file
+  int level;
+  float value;
+};
+
+/// Trees over root cells of level `top`, each cell split by 2^step or left out by chance.
+std::vector<Leaf> random_leaves(std::mt19937& random, int top, int step) {
+  constexpr std::size_t kMost = 5000;
+  std::vector<Leaf> leaves;
+  const auto split = 20 + random() % 50;  // percent
+  const auto left_out = random() % 3 * 10;
+  std::vector<Leaf> open;
+  const Vec3i roots(1 + random() % 5, 1 + random() % 5, 1 + random() % 5);
+  const Vec3i apart(8 << top, 0, 3 << top);
+  for (const Vec3i& root : {Vec3i(-7), Vec3i(-7) + apart})  // two boxes
+    for_each_cell({Vec3i(0), roots}, [&](const Vec3i& c) { open.push_back({root + c * (1 << top), top, 0}); });
+  while (!open.empty()) {
+    const Leaf cell = open.back();
+    open.pop_back();
+    if (cell.level >= step && leaves.size() + open.size() < kMost && random() % 100 < split)
+      for_each_cell({Vec3i(0), Vec3i(1 << step)}, [&](const Vec3i& c) {
+        open.push_back({cell.lower + c * (1 << (cell.level - step)), cell.level - step, 0});
+      });
+    else if (random() % 100 >= left_out || leaves.empty())
+      leaves.push_back(cell);
+  }
+  std::shuffle(leaves.begin(), leaves.end(), random);
+  for (std::size_t i = 0; i < leaves.size(); ++i) leaves[i].value = static_cast<float>(i);
+  return leaves;
+}
+
+/// The mesh has these leaves and no others, with these values.
+void expect_leaves(const AmrHierarchy& mesh, int field, const std::vector<Leaf>& leaves) {
+  ASSERT_EQ(mesh.leaf_cells(), std::ssize(leaves));
+  int finest = leaves.front().level;
+  Vec3i lower = leaves.front().lower;
+  for (const Leaf& leaf : leaves) {
+    finest = std::min(finest, leaf.level);
+    lower = glm::min(lower, leaf.lower);
+  }
+  EXPECT_LT(glm::length(mesh.domain_lower() - Vec3d(lower)), 2 * mesh.cell_width(0) << finest);
+  int wrong = 0;
+  for (const Leaf& leaf : leaves) {
+    const auto found = mesh.find_leaf(Vec3i(Vec3d(leaf.lower) - mesh.domain_lower()) / (1 << finest));
+    const bool same =
+        found && mesh.cell_width(found->level) == 1 << (leaf.level - finest) && mesh.value(*found, field) == leaf.value;
+    wrong += same ? 0 : 1;
+  }
+  EXPECT_EQ(wrong, 0);
+}
+
+/// Scalars in random order, bricks of rows of cells where the leaves have them.
+void write_bricks(const fs::path& bricks, const fs::path& scalars, const std::vector<Leaf>& leaves, std::mt19937& random) {
+  std::vector<std::int32_t> ids(leaves.size());
+  for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = static_cast<std::int32_t>(i);
+  std::shuffle(ids.begin(), ids.end(), random);
+  Scalars values(leaves.size());
+  std::vector<std::size_t> order(leaves.size());
+  for (std::size_t i = 0; i < leaves.size(); ++i) {
+    order[i] = i;
+    values[static_cast<std::size_t>(ids[i])] = leaves[i].value;
+  }
+  const auto key = [&](std::size_t i) {
+    const Leaf& leaf = leaves[i];
+    return std::tuple(leaf.level, leaf.lower.z, leaf.lower.y, leaf.lower.x);
+  };
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return key(a) < key(b); });
+  Cells words;
+  for (std::size_t i = 0; i < order.size();) {
+    const Leaf& first = leaves[order[i]];
+    std::size_t end = i;
+    for (; end < order.size(); ++end) {
+      const Vec3i expected = first.lower + Vec3i(static_cast<int>(end - i) << first.level, 0, 0);
+      if (leaves[order[end]].level != first.level || leaves[order[end]].lower != expected) break;
+    }
+    words.insert(words.end(), {static_cast<int>(end - i), 1, 1, first.lower.x, first.lower.y, first.lower.z, first.level});
+    for (; i < end; ++i) words.push_back(ids[order[i]]);
+  }
+  write_bytes(bricks, {reinterpret_cast<const char*>(words.data()), words.size() * sizeof(std::int32_t)});
+  write_bytes(scalars, {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float)});
+}
+
+TEST_F(ExaBrick, LeavesAndValuesAreThoseOfTheFile) {
+  std::mt19937 random(5);
+  for (int turn = 0; turn < 30; ++turn) {
+    SCOPED_TRACE(turn);
+    const int step = 1 + turn % 3;  // levels between are skipped: ratios of 2, 4 and 8
+    const std::vector<Leaf> leaves = random_leaves(random, 2 * step + turn % 2, step);
+    Cells cells;
+    Scalars scalars;
+    for (const Leaf& leaf : leaves) {
+      cells.insert(cells.end(), {leaf.lower.x, leaf.lower.y, leaf.lower.z, leaf.level});
+      scalars.push_back(leaf.value);
+    }
+    write_values("a.scalars", scalars);
+    expect_leaves(AmrHierarchy(read_mesh(write_values("a.cells", cells))), 0, leaves);
+    write_bricks(at("b.bricks"), at("b.scalars"), leaves, random);
+    expect_leaves(AmrHierarchy(read_mesh(at("b.bricks"))), 0, leaves);
+  }
+}
+
+/// A million cells: 96^3, and 64^3 of half their width in place of 32^3 at the lower corner.
+template <class F>
+void for_each_of_a_million(F&& f) {
+  for_each_cell({Vec3i(0), Vec3i(64)}, [&](const Vec3i& c) { f(c, 0); });
+  for_each_cell({Vec3i(0), Vec3i(96)}, [&](const Vec3i& c) {
+    if (glm::any(glm::greaterThanEqual(c, Vec3i(32)))) f(2 * c, 1);
+  });
+}
+
+TEST_F(ExaBrick, ManyCellsInRandomOrderFindTheirValues) {
+  std::vector<Leaf> leaves;
+  for_each_of_a_million([&](const Vec3i& c, int level) { leaves.push_back({c, level, static_cast<float>(leaves.size())}); });
+  std::mt19937 random(6);
+  write_bricks(at("b.u.bricks"), at("b.u.scalars"), leaves, random);
+  fs::rename(at("b.u.bricks"), at("b.bricks"));
+  fs::copy(at("b.u.scalars"), at("b.v.scalars"));
+  const AmrHierarchy mesh(read_mesh(at("b.bricks")));
+  ASSERT_EQ(mesh.fields(), (std::vector<std::string>{"u", "v"}));
+  for (int field = 0; field < 2; ++field) expect_leaves(mesh, field, leaves);
+}
+
+TEST_F(ExaBrick, OneBrickMayBeLongerThanAnyChunk) {
+  // a row of 200000 cells, whose scalars stand in reverse
+  constexpr int kLength = 200000;
+  Cells words = {kLength, 1, 1, 3, 0, 0, 0};
+  for (int i = kLength; i-- > 0;) words.push_back(i);
+  write_values("b.scalars", counted(kLength));
+  const AmrHierarchy mesh(read_mesh(write_values("b.bricks", words)));
+  ASSERT_EQ(mesh.leaf_cells(), kLength);
+  for (int i = 0; i < kLength; i += 101) EXPECT_EQ(mesh.value(*mesh.find_leaf({i, 0, 0}), 0), kLength - 1 - i);
+}
+
+TEST_F(ExaBrick, TheFirstOfSeveralFaultsIsNamed) {
+  // far more cells than are read at once, of which two have no level, and two places are taken twice
+  Cells cells;
+  for (int i = 0; i < 300000; ++i) cells.insert(cells.end(), {i, 0, 0, 0});
+  const auto level_of = [&](std::size_t cell) -> std::int32_t& { return cells[4 * cell + 3]; };
+  cells[4 * 299999] = 7;
+  cells[4 * 250000] = 7;
+  cells[4 * 70001] = 70000;
+  EXPECT_THAT(refusal(cells), HasSubstr("cells 7 and 250000 overlap"));
+  level_of(280000) = level_of(140000) = 31;
+  EXPECT_THAT(refusal(cells), HasSubstr("cell 140000 has level 31"));
+}
+
+TEST_F(ExaBrick, CellsAreNotHeld) {
+  std::size_t count = 0;
+  {
+    std::ofstream cells(at("m.cells"), std::ios::binary);
+    std::ofstream scalars(at("m.scalars"), std::ios::binary);
+    for_each_of_a_million([&](const Vec3i& c, int level) {
+      const std::array<std::int32_t, 4> cell{c.x, c.y, c.z, level};
+      const float value = static_cast<float>(++count);
+      cells.write(reinterpret_cast<const char*>(&cell), sizeof cell);
+      scalars.write(reinterpret_cast<const char*>(&value), sizeof value);
+    });
+  }
+  const std::int64_t before = peak_bytes();
+  const MeshDescription mesh = read_mesh(at("m.cells"));
+  // the file has 16 bytes a cell, the mesh 4; each of the 17 chunks of 64 Ki cells may be in the hands of a thread
+  EXPECT_LE(peak_bytes() - before, 32 * static_cast<std::int64_t>(count));
+  EXPECT_EQ(mesh.levels.size(), 2U);
 }
 
 // ---- bad input ----

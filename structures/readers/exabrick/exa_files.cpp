@@ -3,11 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
-#include <limits>
 
 #include "structures/mesh/quoted.hpp"
-#include "structures/readers/memory_check.hpp"
 #include "structures/readers/reader_tools.hpp"
 
 namespace amrtex {
@@ -15,92 +12,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-static_assert(std::endian::native == std::endian::little, "the files are little endian and read as they are");
-
-constexpr std::uint64_t kMostCells = std::numeric_limits<std::int32_t>::max();  // a brick's ids are 32-bit
-
 [[noreturn]] void refuse(const fs::path& file, const std::string& what) {
   throw Error(fmt::format("{}: {}", file.string(), what));
 }
-
-/// Number of elements of `bytes` each; the file must hold whole ones.
-std::uint64_t count_elements(const fs::path& file, std::uint64_t bytes, std::string_view what) {
-  const std::uint64_t size = regular_file_size(file);
-  if (size == 0) refuse(file, "is empty");
-  if (size % bytes != 0) refuse(file, fmt::format("{} bytes are no whole number of {} of {} bytes", size, what, bytes));
-  return size / bytes;
-}
-
-template <class T>
-std::vector<T> load_elements(const fs::path& file, std::uint64_t count) {
-  require_memory(file, CheckedSize::of(count * sizeof(T) / sizeof(double)), 1);
-  std::vector<T> elements(static_cast<std::size_t>(count));
-  std::ifstream in(file, std::ios::binary);
-  in.read(reinterpret_cast<char*>(elements.data()), static_cast<std::streamsize>(count * sizeof(T)));
-  if (!in) refuse(file, fmt::format("its {} bytes cannot be read", count * sizeof(T)));
-  return elements;
-}
-
-ExaCells load_cells(const fs::path& file, std::uint64_t scalars) {
-  const std::uint64_t count = count_elements(file, sizeof(ExaCell), "cells");
-  if (count != scalars) refuse(file, fmt::format("{} cells, but its scalars are {} values", count, scalars));
-  return {load_elements<ExaCell>(file, count), {}};
-}
-
-/// Reads bricks one after the other. Each is checked against what is left of the file before it is used.
-class BrickScanner {
- public:
-  BrickScanner(const fs::path& file, std::uint64_t scalars)
-      : file_(file), words_(load_elements<std::int32_t>(file, count_elements(file, 4, "numbers"))), scalars_(scalars) {}
-
-  ExaCells scan() {
-    while (at_ < words_.size()) scan_brick();
-    if (found_.cells.size() != scalars_)
-      refuse(file_, fmt::format("its bricks hold {} cells, but its scalars are {} values", found_.cells.size(), scalars_));
-    return std::move(found_);
-  }
-
- private:
-  [[noreturn]] void refuse_brick(const std::string& what) const { refuse(file_, fmt::format("brick {}: {}", bricks_, what)); }
-
-  void scan_brick() {
-    if (words_.size() - at_ < 7) refuse_brick(fmt::format("its head needs 28 bytes, {} are left", 4 * (words_.size() - at_)));
-    const std::int32_t* head = &words_[at_];
-    const Vec3i size(head[0], head[1], head[2]);
-    const int level = head[6];
-    at_ += 7;
-    if (glm::any(glm::lessThan(size, Vec3i(1))))
-      refuse_brick(fmt::format("its size is {} x {} x {} cells", size.x, size.y, size.z));
-    if (level < 0 || level > kMostExaLevel) refuse_brick(fmt::format("its level is {}; accepted: 0 to {}", level, kMostExaLevel));
-    const CheckedSize cells = CheckedSize(size.x) * CheckedSize(size.y) * CheckedSize(size.z);
-    if (static_cast<std::uint64_t>(cells.or_most()) > words_.size() - at_)
-      refuse_brick(
-          fmt::format("its {} x {} x {} cells need as many numbers, {} are left", size.x, size.y, size.z, words_.size() - at_));
-    const std::int64_t width = std::int64_t{1} << level;
-    const auto corner = [&](int axis, int step) {
-      const std::int64_t at = head[3 + axis] + step * width;
-      if (at > std::numeric_limits<std::int32_t>::max()) refuse_brick("it reaches beyond 31 bits of index");
-      return static_cast<std::int32_t>(at);
-    };
-    for_each_cell({Vec3i(0), size}, [&](const Vec3i& c) { add({corner(0, c.x), corner(1, c.y), corner(2, c.z), level}); });
-    ++bricks_;
-  }
-
-  void add(const ExaCell& cell) {
-    const std::int32_t id = words_[at_++];
-    if (id < 0 || static_cast<std::uint64_t>(id) >= scalars_)
-      refuse_brick(fmt::format("a cell's number is {}; its scalars are {} values", id, scalars_));
-    found_.cells.push_back(cell);
-    found_.scalar.push_back(static_cast<std::uint32_t>(id));
-  }
-
-  fs::path file_;
-  std::vector<std::int32_t> words_;
-  std::uint64_t scalars_;
-  std::size_t at_ = 0;
-  std::size_t bricks_ = 0;
-  ExaCells found_;
-};
 
 fs::path with_ending(fs::path file, const char* ending) { return file.replace_extension(ending); }
 
@@ -253,13 +167,13 @@ ExaFiles find_exa_files(const fs::path& path) {
   refuse(file, fmt::format("its cells are missing: no file {} beside it", with_ending(file, ".cells").filename().string()));
 }
 
-ExaCells load_exa_cells(const ExaFiles& files, std::uint64_t scalars) {
-  if (scalars > kMostCells) refuse(files.geometry, fmt::format("{} cells; at most {} are read", scalars, kMostCells));
-  return files.bricks ? BrickScanner(files.geometry, scalars).scan() : load_cells(files.geometry, scalars);
+std::uint64_t count_exa_elements(const fs::path& file, std::uint64_t bytes, std::string_view what) {
+  const std::uint64_t size = regular_file_size(file);
+  if (size == 0) refuse(file, "is empty");
+  if (size % bytes != 0) refuse(file, fmt::format("{} bytes are no whole number of {} of {} bytes", size, what, bytes));
+  return size / bytes;
 }
 
-std::uint64_t count_exa_scalars(const fs::path& scalars) { return count_elements(scalars, sizeof(float), "values"); }
-
-std::vector<float> load_exa_scalars(const fs::path& scalars) { return load_elements<float>(scalars, count_exa_scalars(scalars)); }
+std::uint64_t count_exa_scalars(const fs::path& scalars) { return count_exa_elements(scalars, sizeof(float), "values"); }
 
 }  // namespace amrtex

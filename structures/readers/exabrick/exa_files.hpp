@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "structures/mesh/spaces.hpp"
@@ -19,11 +20,6 @@ struct ExaCell {
   std::int64_t width() const { return std::int64_t{1} << level; }
 };
 static_assert(sizeof(ExaCell) == 16);
-
-struct ExaCells {
-  std::vector<ExaCell> cells;
-  std::vector<std::uint32_t> scalar;  ///< each cell's place in the arrays of scalars; empty where they are in the same order
-};
 
 struct ExaField {
   std::string name;
@@ -49,11 +45,9 @@ inline constexpr int kMostExaLevel = 30;
 /// What belongs to the file or folder that somebody named.
 ExaFiles find_exa_files(const std::filesystem::path& path);
 
-/// Reads `.cells` or `.bricks`; `scalars` is how many values each array has.
-ExaCells load_exa_cells(const ExaFiles& files, std::uint64_t scalars);
-
+/// Elements of `bytes` each that the file holds. Throws Error where they are no whole number; `what` names them.
+std::uint64_t count_exa_elements(const std::filesystem::path& file, std::uint64_t bytes, std::string_view what);
 /// How many values a file of scalars holds.
 std::uint64_t count_exa_scalars(const std::filesystem::path& scalars);
-std::vector<float> load_exa_scalars(const std::filesystem::path& scalars);
 
 }  // namespace amrtex

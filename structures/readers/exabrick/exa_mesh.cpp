@@ -1,25 +1,25 @@
 #include "structures/readers/exabrick/exa_mesh.hpp"
 
 #include <fmt/format.h>
-#include <tbb/parallel_sort.h>
+#include <tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
-#include <array>
 #include <limits>
+#include <mutex>
+#include <string>
+#include <utility>
 
 #include "structures/mesh/cell_boxes.hpp"
+#include "structures/mesh/error.hpp"
+#include "structures/readers/exabrick/cell_cubes.hpp"
 
 namespace amrtex {
 namespace {
 
-namespace fs = std::filesystem;
-
-using Cells = std::vector<Vec3i>;
-
 std::string text(const ExaCell& c) { return fmt::format("({}, {}, {}) of level {}", c.x, c.y, c.z, c.level); }
 
-[[noreturn]] void refuse(const fs::path& file, const std::string& what) {
-  throw Error(fmt::format("{}: {}", file.string(), what));
+[[noreturn]] void refuse(const ExaCellFile& file, const std::string& what) {
+  throw Error(fmt::format("{}: {}", file.path().string(), what));
 }
 
 std::int64_t floor_to(std::int64_t value, std::int64_t width) {
@@ -27,178 +27,182 @@ std::int64_t floor_to(std::int64_t value, std::int64_t width) {
   return value - (rest < 0 ? rest + width : rest);
 }
 
-/// Where the grid of the coarsest cells begins and how far it goes, in the file's units.
-struct Extent {
-  std::array<std::int64_t, 3> lower{};
-  std::array<std::int64_t, 3> upper{};
-};
+std::array<std::int64_t, 3> corner(const ExaCell& c) { return {c.x, c.y, c.z}; }
 
-Extent find_extent(const fs::path& file, const std::vector<ExaCell>& cells) {
-  for (std::size_t i = 0; i < cells.size(); ++i)
-    if (cells[i].level < 0 || cells[i].level > kMostExaLevel)
-      refuse(file, fmt::format("cell {} has level {}; accepted: 0 to {}", i, cells[i].level, kMostExaLevel));
-  const ExaCell& widest =
-      *std::max_element(cells.begin(), cells.end(), [](const ExaCell& a, const ExaCell& b) { return a.level < b.level; });
-  Extent extent;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto at = [axis](const ExaCell& c) -> std::int64_t { return std::array{c.x, c.y, c.z}[axis]; };
-    std::int64_t lower = std::numeric_limits<std::int64_t>::max();
-    std::int64_t upper = std::numeric_limits<std::int64_t>::min();
-    for (const ExaCell& c : cells) {
-      lower = std::min(lower, at(c));
-      upper = std::max(upper, at(c) + c.width());
+/// What some cells reach over.
+struct Reach {
+  std::array<std::int64_t, 3> lower;
+  std::array<std::int64_t, 3> upper;
+  std::uint32_t levels = 0;  ///< a bit each
+  ExaCell widest{};          ///< the first of the coarsest ones
+  std::uint64_t number = 0;  ///< of the widest one
+
+  Reach() {
+    lower.fill(std::numeric_limits<std::int64_t>::max());
+    upper.fill(std::numeric_limits<std::int64_t>::min());
+  }
+
+  void add(const CellRun& run, std::uint64_t run_number) {
+    const auto at = corner(run.first);
+    const std::int64_t width = run.first.width();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      lower[axis] = std::min(lower[axis], at[axis]);
+      upper[axis] = std::max(upper[axis], at[axis] + width * (axis == 0 ? std::int64_t{run.count} : 1));
     }
-    const std::int64_t origin = at(widest);  // a corner of the coarsest grid
-    extent.lower[axis] = origin + floor_to(lower - origin, widest.width());
-    extent.upper[axis] = origin - floor_to(origin - upper, widest.width());
-    if (extent.upper[axis] - extent.lower[axis] > std::numeric_limits<std::int32_t>::max())
-      refuse(file, fmt::format("its cells reach from {} to {} along axis {}; at most 31 bits are supported", lower, upper,
-                               "xyz"[axis]));
+    add_widest(run.first, run_number);
+    levels |= 1U << run.first.level;
   }
-  return extent;
-}
+  void add(const Reach& other) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      lower[axis] = std::min(lower[axis], other.lower[axis]);
+      upper[axis] = std::max(upper[axis], other.upper[axis]);
+    }
+    if (other.levels != 0) add_widest(other.widest, other.number);
+    levels |= other.levels;
+  }
 
-/// A cell's parent on a grid `ratio` times as wide. No cell is below 0.
-Vec3i parent_of(const Vec3i& cell, int ratio) { return cell / ratio; }
-
-void sort_cells(Cells& cells) { tbb::parallel_sort(cells.begin(), cells.end(), array_order); }
-
-/// What a level holds, met from the finest level on.
-struct LevelCells {
-  Cells whole;    ///< leaves, and cells whose children are all whole
-  Cells parents;  ///< of the next coarser level: those whose children are all whole
-  Cells touched;  ///< of the next coarser level: those with anything under them
+ private:
+  /// To be called before the level's bit is set.
+  void add_widest(const ExaCell& cell, std::uint64_t cell_number) {
+    const bool wider = levels == 0 || cell.level > widest.level || (cell.level == widest.level && cell_number < number);
+    if (!wider) return;
+    widest = cell;
+    number = cell_number;
+  }
 };
 
-Cells leaf_cells_of(const std::vector<PlacedCell>& leaves) {
-  Cells cells;
-  cells.reserve(leaves.size());
-  for (const PlacedCell& leaf : leaves) cells.push_back(leaf.cell);
-  return cells;
+Reach find_reach(const ExaCellFile& file) {
+  Reach all;
+  std::mutex mutex;
+  file.for_each_chunk([&](const CellChunk& chunk) {
+    Reach own;
+    for (const CellRun& run : chunk.runs) own.add(run, chunk.first_cell + run.place);
+    const std::lock_guard lock(mutex);
+    all.add(own);
+  });
+  return all;
 }
 
-Cells merged(const Cells& a, const Cells& b) {
-  Cells both(a.size() + b.size());
-  std::merge(a.begin(), a.end(), b.begin(), b.end(), both.begin(), array_order);
-  return both;
+/// All cells of the file, a set each of our levels.
+std::vector<CellCollector> collect_cells(const ExaCellFile& file, const ExaGrid& grid) {
+  std::vector<CellCollector> levels(grid.levels.size());
+  tbb::enumerable_thread_specific<CellGatherer> gatherers([&] { return CellGatherer(levels); });
+  file.for_each_chunk([&](const CellChunk& chunk) {
+    CellGatherer& gatherer = gatherers.local();
+    for (const CellRun& run : chunk.runs) {
+      const auto at = corner(run.first);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        if ((at[axis] - grid.lower[axis]) % run.first.width() != 0)
+          throw BadCell{chunk.first_cell + run.place,
+                        fmt::format("cell {} {} does not lie on a multiple of its width, {}", chunk.first_cell + run.place,
+                                    text(run.first), run.first.width())};
+      gatherer.add(grid.level_of(run.first), grid.place(run.first), run.count);
+    }
+  });
+  for (CellGatherer& gatherer : gatherers) gatherer.flush();
+  return levels;
 }
 
-/// Finds the parents of a level's cells, `ratio` times as wide.
-void find_parents(LevelCells& level, const Cells& touched_here, int ratio) {
-  Cells all;
-  all.reserve(level.whole.size());
-  for (const Vec3i& c : level.whole) all.push_back(parent_of(c, ratio));
-  sort_cells(all);
-  const double children = static_cast<double>(ratio) * ratio * ratio;
-  for (std::size_t i = 0; i < all.size();) {
-    std::size_t end = i;
-    while (end < all.size() && all[end] == all[i]) ++end;
-    if (static_cast<double>(end - i) == children) level.parents.push_back(all[i]);
-    level.touched.push_back(all[i]);
-    i = end;
+/// Names the first two cells of the file that lie in one place.
+[[noreturn]] void refuse_twice(const ExaCellFile& file, const ExaGrid& grid, std::size_t level, const Vec3i& cell) {
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> there;  // number in the file, place in the scalars
+  std::mutex mutex;
+  file.for_each_chunk([&](const CellChunk& chunk) {
+    for (const CellRun& run : chunk.runs) {
+      const Vec3i first = grid.place(run.first);
+      const std::int64_t step = std::int64_t{cell.x} - first.x;
+      if (grid.level_of(run.first) != level || first.y != cell.y || first.z != cell.z || step < 0 || step >= run.count) continue;
+      const std::uint32_t place = run.place + static_cast<std::uint32_t>(step);
+      const std::lock_guard lock(mutex);
+      there.emplace_back(chunk.first_cell + place, chunk.scalar(place));
+      std::sort(there.begin(), there.end());
+      if (there.size() > 2) there.pop_back();
+    }
+  });
+  if (there.size() < 2) refuse(file, "changed while it was read");
+  refuse(file, fmt::format("cells {} and {} overlap: both are of level {} at one place", there[0].second, there[1].second,
+                           grid.levels[level]));
+}
+
+/// Sets of leaves by level.
+std::vector<CellCubes> find_leaves(const ExaCellFile& file, const ExaGrid& grid) {
+  std::vector<CellCollector> collected = collect_cells(file, grid);
+  std::vector<CellCubes> leaves;
+  for (std::size_t l = 0; l < collected.size(); ++l) {
+    if (const auto cell = collected[l].twice()) refuse_twice(file, grid, l, *cell);
+    leaves.push_back(collected[l].take());
   }
-  for (const Vec3i& c : touched_here) level.touched.push_back(parent_of(c, ratio));
-  sort_cells(level.touched);
-  level.touched.erase(std::unique(level.touched.begin(), level.touched.end()), level.touched.end());
+  return leaves;
+}
+
+void require_apart(const ExaCellFile& file, const CellCubes& leaves, const CellCubes& touched, int width) {
+  const CellCubes both = common(leaves, touched);
+  if (both.empty()) return;
+  const Vec3i first = first_cell(both);
+  refuse(file, fmt::format("{} cells overlap finer ones; the first is {} finest cells wide, at ({}, {}, {}) of its level",
+                           count_cells(both), width, first.x, first.y, first.z));
 }
 
 /// Boxes of a level's cells: those of whole parents by the parents' boxes, so that no stored parent is cut.
-std::vector<Box> boxes_of_level(const LevelCells& level, int ratio) {
-  std::vector<Box> boxes = boxes_of_cells(level.parents);
+std::vector<Box> boxes_of_level(const CellCubes& cells, const CellCubes& parents, int ratio) {
+  std::vector<Box> boxes = boxes_of_runs(runs_of(parents));
   for (Box& box : boxes) box = box.refined(ratio);
-  Cells others;
-  for (const Vec3i& c : level.whole)
-    if (!std::binary_search(level.parents.begin(), level.parents.end(), parent_of(c, ratio), array_order)) others.push_back(c);
-  const std::vector<Box> rest = boxes_of_cells(others);
+  const std::vector<Box> rest = boxes_of_runs(runs_of(outside(cells, parents, ratio)));
   boxes.insert(boxes.end(), rest.begin(), rest.end());
   return boxes;
 }
 
-void require_apart(const fs::path& file, const Cells& leaves, const Cells& touched, int width) {
-  Cells both;
-  std::set_intersection(leaves.begin(), leaves.end(), touched.begin(), touched.end(), std::back_inserter(both), array_order);
-  if (!both.empty())
-    refuse(file, fmt::format("{} cells overlap finer ones; the first is {} finest cells wide, at ({}, {}, {}) of its level",
-                             both.size(), width, both[0].x, both[0].y, both[0].z));
-}
-
 }  // namespace
 
-ExaLeaves place_leaves(const fs::path& file, ExaCells cells) {
-  const Extent extent = find_extent(file, cells.cells);
-  std::array<std::vector<PlacedCell>, kMostExaLevel + 1> by_level;
-  for (std::size_t i = 0; i < cells.cells.size(); ++i) {
-    const ExaCell& c = cells.cells[i];
-    const std::array from = {c.x - extent.lower[0], c.y - extent.lower[1], c.z - extent.lower[2]};
-    for (const std::int64_t d : from)
-      if (d % c.width() != 0)
-        refuse(file, fmt::format("cell {} {} does not lie on a multiple of its width, {}", i, text(c), c.width()));
-    const Vec3i at(static_cast<int>(from[0] / c.width()), static_cast<int>(from[1] / c.width()),
-                   static_cast<int>(from[2] / c.width()));
-    by_level[static_cast<std::size_t>(c.level)].push_back(
-        {at, cells.scalar.empty() ? static_cast<std::uint32_t>(i) : cells.scalar[i]});
-  }
-  cells = {};
-  ExaLeaves leaves;
-  for (int level = kMostExaLevel; level >= 0; --level) {
-    auto& placed = by_level[static_cast<std::size_t>(level)];
-    if (placed.empty()) continue;
-    tbb::parallel_sort(placed.begin(), placed.end(),
-                       [](const PlacedCell& a, const PlacedCell& b) { return array_order(a.cell, b.cell); });
-    const auto twice = std::adjacent_find(placed.begin(), placed.end(),
-                                          [](const PlacedCell& a, const PlacedCell& b) { return a.cell == b.cell; });
-    if (twice != placed.end())
-      refuse(file, fmt::format("cells {} and {} overlap: both are of level {} at one place", twice->scalar, (twice + 1)->scalar,
-                               level));
-    leaves.widths.push_back(1 << level);
-    leaves.levels.push_back(std::move(placed));
-  }
-  const std::int64_t root = leaves.widths.front();
-  const std::int64_t finest = leaves.widths.back();
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto a = static_cast<std::size_t>(axis);
-    leaves.lower[axis] = static_cast<double>(extent.lower[a]);
-    leaves.upper[axis] = static_cast<double>(extent.upper[a]);
-    leaves.root_cells[axis] = static_cast<int>((extent.upper[a] - extent.lower[a]) / root);
-  }
-  for (int& width : leaves.widths) width = static_cast<int>(width / finest);
-  return leaves;
+Vec3i ExaGrid::root_cells() const {
+  const auto count = [&](std::size_t axis) { return static_cast<int>((upper[axis] - lower[axis]) >> levels.front()); };
+  return {count(0), count(1), count(2)};
 }
 
-std::vector<std::vector<Box>> patch_boxes(const fs::path& file, const ExaLeaves& leaves) {
-  const std::size_t levels = leaves.levels.size();
-  std::vector<std::vector<Box>> boxes(levels);
-  LevelCells finer;
-  for (std::size_t l = levels; l-- > 0;) {
-    LevelCells level;
-    const Cells own = leaf_cells_of(leaves.levels[l]);
-    require_apart(file, own, finer.touched, leaves.widths[l]);
-    level.whole = merged(own, finer.parents);
+Vec3i ExaGrid::place(const ExaCell& cell) const {
+  return {static_cast<int>((cell.x - lower[0]) >> cell.level), static_cast<int>((cell.y - lower[1]) >> cell.level),
+          static_cast<int>((cell.z - lower[2]) >> cell.level)};
+}
+
+ExaGrid find_grid(const ExaCellFile& file) {
+  const Reach reach = find_reach(file);
+  ExaGrid grid;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::int64_t origin = corner(reach.widest)[axis];  // a corner of the coarsest grid
+    const std::int64_t width = reach.widest.width();
+    grid.lower[axis] = origin + floor_to(reach.lower[axis] - origin, width);
+    grid.upper[axis] = origin - floor_to(origin - reach.upper[axis], width);
+    if (grid.upper[axis] - grid.lower[axis] > std::numeric_limits<std::int32_t>::max())
+      refuse(file, fmt::format("its cells reach from {} to {} along axis {}; at most 31 bits are supported", reach.lower[axis],
+                               reach.upper[axis], "xyz"[axis]));
+  }
+  for (int level = kMostExaLevel; level >= 0; --level)
+    if ((reach.levels >> level & 1) != 0) {
+      grid.ours[static_cast<std::size_t>(level)] = grid.levels.size();
+      grid.levels.push_back(level);
+    }
+  return grid;
+}
+
+std::vector<std::vector<Box>> patch_boxes(const ExaCellFile& file, const ExaGrid& grid) {
+  std::vector<CellCubes> leaves = find_leaves(file, grid);
+  std::vector<std::vector<Box>> boxes(leaves.size());
+  CellCubes whole;    // cells of the level whose children are all there
+  CellCubes touched;  // cells of the level with anything under them
+  for (std::size_t l = leaves.size(); l-- > 0;) {
+    const CellCubes own = std::move(leaves[l]);
+    require_apart(file, own, touched, grid.width(l));
+    const CellCubes cells = joined(own, whole);
     if (l == 0) {
-      boxes[0] = boxes_of_cells(level.whole);
+      boxes[0] = boxes_of_runs(runs_of(cells));
       break;
     }
-    const int ratio = leaves.widths[l - 1] / leaves.widths[l];
-    find_parents(level, finer.touched, ratio);
-    boxes[l] = boxes_of_level(level, ratio);
-    finer = std::move(level);
+    const int ratio = grid.ratio_to_finer(l - 1);
+    whole = whole_parents(cells, ratio);
+    touched = touched_parents(joined(cells, touched), ratio);
+    boxes[l] = boxes_of_level(cells, whole, ratio);
   }
   return boxes;
-}
-
-CellArray<float> box_values(const Box& box, const std::vector<PlacedCell>& leaves, const std::vector<float>& scalars) {
-  CellArray<float> values(static_cast<std::size_t>(box.cells()), std::numeric_limits<float>::quiet_NaN());
-  const int length = box.size().x;
-  float* row = values.data();
-  for (int z = box.lower.z; z < box.upper.z; ++z)
-    for (int y = box.lower.y; y < box.upper.y; ++y, row += length) {
-      const Vec3i first(box.lower.x, y, z);
-      auto leaf = std::lower_bound(leaves.begin(), leaves.end(), first,
-                                   [](const PlacedCell& a, const Vec3i& b) { return array_order(a.cell, b); });
-      for (; leaf != leaves.end() && leaf->cell.z == z && leaf->cell.y == y && leaf->cell.x < box.upper.x; ++leaf)
-        row[leaf->cell.x - box.lower.x] = scalars[leaf->scalar];
-    }
-  return values;
 }
 
 }  // namespace amrtex

@@ -1,38 +1,37 @@
-// Single leaf cells to levels of patches.
+// Single leaf cells to levels of boxes.
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <filesystem>
 #include <vector>
 
-#include "structures/mesh/amr_hierarchy.hpp"
-#include "structures/readers/exabrick/exa_files.hpp"
+#include "structures/mesh/spaces.hpp"
+#include "structures/readers/exabrick/exa_cells.hpp"
 
 namespace amrtex {
 
-/// A leaf in our spaces.
-struct PlacedCell {
-  Vec3i cell;            ///< level space
-  std::uint32_t scalar;  ///< place in the arrays of scalars
+/// Where the mesh lies in the file's units, finest cells, and which levels it has: coarsest first, those alone that have leaves.
+struct ExaGrid {
+  std::array<std::int64_t, 3> lower{};  ///< of the domain, on the grid of the coarsest cells
+  std::array<std::int64_t, 3> upper{};
+  std::vector<int> levels;                            ///< the file's number of each of ours
+  std::array<std::size_t, kMostExaLevel + 1> ours{};  ///< our number of each of the file's levels
+
+  /// Of our levels, in cells of the finest one.
+  int width(std::size_t level) const { return 1 << (levels[level] - levels.back()); }
+  int ratio_to_finer(std::size_t level) const { return 1 << (levels[level] - levels[level + 1]); }
+  Vec3i root_cells() const;
+  std::size_t level_of(const ExaCell& cell) const { return ours[static_cast<std::size_t>(cell.level)]; }
+  /// Space of its level.
+  Vec3i place(const ExaCell& cell) const;
 };
 
-/// Leaves by level, coarsest first, in array order. Only levels that have leaves.
-struct ExaLeaves {
-  std::vector<int> widths;                      ///< a level, in finest cells
-  std::vector<std::vector<PlacedCell>> levels;  ///< a level
-  Vec3d lower{0}, upper{1};                     ///< of the domain, in the file's units
-  Vec3i root_cells{1};
-};
-
-/// Sorts cells into levels. `file` is for messages. Throws Error for levels out of range and cells that do not lie on
-/// multiples of their width, or that lie twice in one place.
-ExaLeaves place_leaves(const std::filesystem::path& file, ExaCells cells);
+/// Throws Error for a domain of more than 31 bits of index.
+ExaGrid find_grid(const ExaCellFile& file);
 
 /// Boxes of patches a level. A cell whose children exist all the way down is stored as well, so that its mean is computed
-/// once; cells around holes become patches of leaves alone. Throws Error for leaves that overlap.
-std::vector<std::vector<Box>> patch_boxes(const std::filesystem::path& file, const ExaLeaves& leaves);
-
-/// The values of a box, x fastest; NaN where a cell is no leaf.
-CellArray<float> box_values(const Box& box, const std::vector<PlacedCell>& leaves, const std::vector<float>& scalars);
+/// once; cells around holes become patches of leaves alone. Throws Error for cells that do not lie on multiples of their width,
+/// that lie twice in one place, or over finer ones.
+std::vector<std::vector<Box>> patch_boxes(const ExaCellFile& file, const ExaGrid& grid);
 
 }  // namespace amrtex

@@ -1,12 +1,14 @@
 #include "structures/readers/exabrick/exabrick.hpp"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
+#include <new>
 
 #include "structures/readers/exabrick/exa_files.hpp"
 #include "structures/readers/exabrick/exa_mesh.hpp"
+#include "structures/readers/exabrick/exa_values.hpp"
 #include "structures/readers/memory_check.hpp"
 #include "structures/readers/reader_tools.hpp"
 #include "structures/readers/wanted_fields.hpp"
@@ -34,26 +36,32 @@ std::uint64_t common_count(const std::vector<ExaField>& fields) {
   return count;
 }
 
-void set_domain(const ExaLeaves& leaves, const std::optional<ExaRemap>& remap, MeshDescription& mesh) {
-  const auto world = [&](const Vec3d& p) {
+void set_domain(const ExaGrid& grid, const std::optional<ExaRemap>& remap, MeshDescription& mesh) {
+  const auto world = [&](const std::array<std::int64_t, 3>& corner) {
+    const Vec3d p(corner[0], corner[1], corner[2]);
     if (!remap) return p;
     return remap->to_lower +
            (p - remap->from_lower) * (remap->to_upper - remap->to_lower) / (remap->from_upper - remap->from_lower);
   };
-  mesh.domain_lower = world(leaves.lower);
-  mesh.domain_upper = world(leaves.upper);
-  mesh.root_cells = leaves.root_cells;
+  mesh.domain_lower = world(grid.lower);
+  mesh.domain_upper = world(grid.upper);
+  mesh.root_cells = grid.root_cells();
+  for (std::size_t l = 0; l + 1 < grid.levels.size(); ++l) mesh.ratios.push_back(grid.ratio_to_finer(l));
 }
 
-void fill_patches(const std::vector<ExaField>& fields, const ExaLeaves& leaves, MeshDescription& mesh) {
-  for (const ExaField& field : fields) {
-    const std::vector<float> scalars = load_exa_scalars(field.scalars);
-    for (std::size_t level = 0; level < mesh.levels.size(); ++level)
-      tbb::parallel_for(std::size_t{0}, mesh.levels[level].size(), [&](std::size_t k) {
-        Patch& patch = mesh.levels[level][k];
-        patch.values.push_back(box_values(patch.box, leaves.levels[level], scalars));
-      });
+/// Patches without values.
+std::vector<std::vector<Patch>> empty_patches(const fs::path& path, const std::vector<std::vector<Box>>& boxes,
+                                              std::size_t fields) {
+  CheckedSize cells;
+  for (const auto& level : boxes)
+    for (const Box& box : level) cells += box.cells();
+  require_memory(path, cells, fields, sizeof(float));
+  std::vector<std::vector<Patch>> levels;
+  for (const auto& level : boxes) {
+    std::vector<Patch>& patches = levels.emplace_back(level.size());
+    for (std::size_t k = 0; k < level.size(); ++k) patches[k].box = level[k];
   }
+  return levels;
 }
 
 }  // namespace
@@ -79,24 +87,19 @@ bool is_exabrick(const fs::path& path) {
 MeshDescription read_exabrick(const fs::path& path, const FieldChoice& fields) {
   const ExaFiles files = find_exa_files(path);
   const std::vector<ExaField> wanted = fields_to_read(path, files.fields, fields);
-  const ExaLeaves leaves = place_leaves(files.geometry, load_exa_cells(files, common_count(wanted)));
-  const auto boxes = patch_boxes(files.geometry, leaves);
+  const ExaCellFile cells(files, common_count(wanted));
+  const ExaGrid grid = find_grid(cells);
   MeshDescription mesh;
   mesh.name = dataset_name(path);
-  set_domain(leaves, files.remap, mesh);
+  set_domain(grid, files.remap, mesh);
   for (const ExaField& field : wanted) mesh.fields.push_back(field.name);
   for (const ExaField& field : files.fields) mesh.fields_there.push_back(field.name);
-  CheckedSize cells;
-  for (const auto& level : boxes) {
-    std::vector<Patch>& patches = mesh.levels.emplace_back();
-    for (const Box& box : level) {
-      patches.push_back({box, {}});
-      cells += box.cells();
-    }
+  try {
+    mesh.levels = empty_patches(path, patch_boxes(cells, grid), wanted.size());
+    read_exa_values(cells, grid, wanted, mesh.levels);
+  } catch (const std::bad_alloc&) {
+    throw Error(fmt::format("{}: not enough memory for the values of {} fields", path.string(), wanted.size()));
   }
-  require_memory(path, cells, wanted.size(), sizeof(float));
-  for (std::size_t l = 1; l < leaves.widths.size(); ++l) mesh.ratios.push_back(leaves.widths[l - 1] / leaves.widths[l]);
-  fill_patches(wanted, leaves, mesh);
   return mesh;
 }
 
