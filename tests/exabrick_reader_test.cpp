@@ -254,6 +254,12 @@ TEST(CellBoxes, OfABoxAreOne) {
   EXPECT_TRUE(boxes_of_cells({}).empty());
 }
 
+TEST(CellBoxes, PartsAreNoWiderThanIsAsked) {
+  const std::array<Box, 2> boxes{Box{{1, 2, 3}, {131, 66, 5}}, Box{{-9, 0, 0}, {-8, 1, 1}}};
+  EXPECT_THAT(parts_of(boxes, 64), ElementsAre(Box{{1, 2, 3}, {65, 66, 5}}, Box{{65, 2, 3}, {129, 66, 5}},
+                                               Box{{129, 2, 3}, {131, 66, 5}}, Box{{-9, 0, 0}, {-8, 1, 1}}));
+}
+
 TEST(CellBoxes, OfRunsAreThoseOfTheirCells) {
   std::mt19937 random(4);
   for (int turn = 0; turn < 20; ++turn) {

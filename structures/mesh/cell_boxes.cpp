@@ -52,4 +52,14 @@ std::vector<Box> boxes_of_runs(std::vector<Box> runs) {
   return runs;
 }
 
+std::vector<Box> parts_of(std::span<const Box> boxes, int edge) {
+  std::vector<Box> parts;
+  for (const Box& box : boxes)
+    for_each_cell({Vec3i(0), ceil_div(box.size(), edge)}, [&](const Vec3i& part) {
+      const Vec3i lower = box.lower + part * edge;
+      parts.push_back({lower, lower + glm::min(Vec3i(edge), box.upper - lower)});
+    });
+  return parts;
+}
+
 }  // namespace amrtex

@@ -18,4 +18,10 @@ std::vector<Box> boxes_of_cells(std::span<const Vec3i> cells);
 /// The same of runs: rows of cells along x, in any order, that do not meet.
 std::vector<Box> boxes_of_runs(std::vector<Box> runs);
 
+/// Cells along an axis of the patches that are made of boxes: patches are worked on in parallel, and each with memory of its own.
+inline constexpr int kWidestPatch = 64;
+
+/// Parts of boxes from their lower corners on, at most `edge` cells wide, in the order of the boxes.
+std::vector<Box> parts_of(std::span<const Box> boxes, int edge);
+
 }  // namespace amrtex

@@ -145,9 +145,9 @@ void require_apart(const ExaCellFile& file, const CellCubes& leaves, const CellC
 
 /// Boxes of a level's cells: those of whole parents by the parents' boxes, so that no stored parent is cut.
 std::vector<Box> boxes_of_level(const CellCubes& cells, const CellCubes& parents, int ratio) {
-  std::vector<Box> boxes = boxes_of_runs(runs_of(parents));
+  std::vector<Box> boxes = parts_of(boxes_of_runs(runs_of(parents)), std::max(1, kWidestPatch / ratio));
   for (Box& box : boxes) box = box.refined(ratio);
-  const std::vector<Box> rest = boxes_of_runs(runs_of(outside(cells, parents, ratio)));
+  const std::vector<Box> rest = parts_of(boxes_of_runs(runs_of(outside(cells, parents, ratio))), kWidestPatch);
   boxes.insert(boxes.end(), rest.begin(), rest.end());
   return boxes;
 }
@@ -194,7 +194,7 @@ std::vector<std::vector<Box>> patch_boxes(const ExaCellFile& file, const ExaGrid
     require_apart(file, own, touched, grid.width(l));
     const CellCubes cells = joined(own, whole);
     if (l == 0) {
-      boxes[0] = boxes_of_runs(runs_of(cells));
+      boxes[0] = parts_of(boxes_of_runs(runs_of(cells)), kWidestPatch);
       break;
     }
     const int ratio = grid.ratio_to_finer(l - 1);

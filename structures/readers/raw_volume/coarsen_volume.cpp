@@ -19,7 +19,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-constexpr int kLargestPatch = 64;                            ///< cells along an axis: patches are what is worked on in parallel
 constexpr std::size_t kValuesAtOnce = std::size_t{1} << 15;  ///< of the volume, a thread; or rows where they are longer
 constexpr int kPlanesAtOnce = 16;                            ///< at least; then their values are given back
 
@@ -276,14 +275,6 @@ class BlockChooser {
   double tolerance_;
 };
 
-/// Parts of a box that are at most kLargestPatch wide.
-void add_parts(const Box& box, std::vector<Patch>& patches) {
-  for_each_cell({Vec3i(0), ceil_div(box.size(), kLargestPatch)}, [&](const Vec3i& part) {
-    const Vec3i lower = box.lower + part * kLargestPatch;
-    patches.push_back({{lower, glm::min(lower + kLargestPatch, box.upper)}, {}});
-  });
-}
-
 /// One piece for the values of a level; none for a few small patches.
 std::shared_ptr<CellMemory> memory_for(const std::vector<Patch>& patches, RealType type) {
   std::size_t bytes = 0;
@@ -294,9 +285,11 @@ std::shared_ptr<CellMemory> memory_for(const std::vector<Patch>& patches, RealTy
 /// Patches over blocks of a level.
 std::vector<Patch> patches_over(std::vector<Vec3i>& blocks, const Box& cells, int edge) {
   std::sort(blocks.begin(), blocks.end(), array_order);
-  std::vector<Patch> patches;
-  for (const Box& box : boxes_of_cells(blocks)) add_parts(intersection(box.refined(edge), cells), patches);
+  std::vector<Box> boxes = boxes_of_cells(blocks);
   blocks = {};
+  for (Box& box : boxes) box = intersection(box.refined(edge), cells);
+  std::vector<Patch> patches;
+  for (const Box& part : parts_of(boxes, kWidestPatch)) patches.push_back({part, {}});
   return patches;
 }
 
