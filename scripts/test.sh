@@ -2,7 +2,8 @@
 # Installs what is missing, builds, and runs the tests: a sample of everything, in minutes.
 #   scripts/test.sh           what each change must pass
 #   scripts/test.sh --full    every combination, then the sanitizers, the compilers of Debian 13 in a bare root, both
-#                             commands of the README in a clone, and planted faults; a missing optional package is a failure
+#                             commands of the README in a clone, planted faults and the rehearsal of gpu_check.sh; a missing optional
+#                             package is a failure
 #   scripts/test.sh -- ARGS   ARGS go to ctest: `scripts/test.sh -- -L reference`
 # AMRTEX_PRESET names the configure preset: `release`, or `ci`, where warnings are errors.
 set -euo pipefail
@@ -41,5 +42,6 @@ if [ $full = yes ]; then
   scripts/check_compilers.sh
   scripts/check_mutations.py
   scripts/check_kills.py "build/$preset/amrtex"
+  AMRTEX_PROGRAM=$PWD/build/$preset/amrtex scripts/gpu_check.sh --rehearse --out "build/$preset/rehearsal"
   scripts/check_comparisons.py
 fi
