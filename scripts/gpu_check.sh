@@ -163,7 +163,8 @@ if [ "$rehearse" = yes ]; then
   say 'REHEARSAL on software rasterisers: small sizes; no time here says anything of a GPU'
   few=(--one-in 40)
   small=(--set width=64 --set height=64 --set frames=1)
-  smaller=("${small[@]}" --set 'datasets={"name": "blobs_shell 128", "generate": {"field": "blobs_shell", "levels": 2}}')
+  smaller=("${small[@]}" --set 'datasets={"name": "blobs_shell 128", "generate": {"field": "blobs_shell", "levels": 2}}'
+           --where 'sampling = adaptive')
   pixels=(--where 'width <= 256')
   contexts=3
   context=(--context egl); LIBGL_ALWAYS_SOFTWARE=1 check llvmpipe
