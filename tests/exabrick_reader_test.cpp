@@ -443,7 +443,10 @@ TEST_F(ExaBrick, CellsAreNotHeld) {
   const MeshDescription mesh = read_mesh(at("m.cells"));
   // the file has 16 bytes a cell, the mesh 4; each of the 17 chunks of 64 Ki cells may be in the hands of a thread
   EXPECT_LE(peak_bytes() - before, 32 * static_cast<std::int64_t>(count));
-  EXPECT_EQ(mesh.levels.size(), 2U);
+  ASSERT_EQ(mesh.levels.size(), 2U);
+  // leaf masks and means are made a patch at a time
+  for (const auto& level : mesh.levels)
+    for (const Patch& patch : level) EXPECT_TRUE(glm::all(glm::lessThanEqual(patch.box.size(), Vec3i(kWidestPatch))));
 }
 
 // ---- bad input ----
