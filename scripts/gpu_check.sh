@@ -146,7 +146,7 @@ check() {
   part stiff 40 'verify: stiff media' "$amrtex" verify --suite stiff "${context[@]}" "${few[@]}" --out "$folder/stiff"
   part extreme 40 'verify: extremes' "$amrtex" verify --suite extreme "${context[@]}" "${few[@]}" --out "$folder/extreme"
   part limits 60 'limits, all encodings' limits
-  part page_sizes 40 'page sizes' run_experiment "$experiments/page_sizes/experiment.json" --set reference=null "${small[@]}"
+  part page_sizes 40 'page sizes' run_experiment "$experiments/page_sizes/experiment.json" --set reference=null "${small[@]}" "${tiny[@]}"
   part pixels 30 'time against pixels' run_experiment "$experiments/gpu/pixels.json" "${pixels[@]}"
   part dispatch 20 'fragment and compute' run_experiment "$experiments/gpu/dispatch.json" "${small[@]}"
   part vollrath 20 'a row of Vollrath 2006' paper vollrath_2006 'dataset = "Audi-like" and mode = dvr'
@@ -159,13 +159,14 @@ check() {
 }
 
 say "amrtex GPU check, $(date -u +%Y-%m-%dT%H:%M:%SZ), $minutes minutes at most, $("$amrtex" --version)"
-few=() small=() smaller=() pixels=() contexts=1 turn=0
+few=() small=() smaller=() tiny=() pixels=() contexts=1 turn=0
 if [ "$rehearse" = yes ]; then
   say 'REHEARSAL on software rasterisers: small sizes; no time here says anything of a GPU'
   few=(--one-in 40)
   small=(--set width=64 --set height=64 --set frames=1)
   smaller=("${small[@]}" --set 'datasets={"name": "blobs_shell 128", "generate": {"field": "blobs_shell", "levels": 2}}'
-           --where 'sampling = adaptive')
+           --where 'sampling = adaptive and filter != nearest')
+  tiny=(--where 'dataset = amrex_tiny')
   pixels=(--where 'width <= 256')
   contexts=3
   context=(--context egl); LIBGL_ALWAYS_SOFTWARE=1 check llvmpipe

@@ -123,6 +123,38 @@ void linear_medium(VerifyContext& v) {
   });
 }
 
+/// f = x on [x0, x1] along +x and -x: its integral, its largest value.
+void linear_field(VerifyContext& v) {
+  const AmrHierarchy h = MeshBuilder(Vec3i(16)).root([](const Vec3d& p) { return p.x; }).hierarchy();
+  constexpr double x0 = 0.25, x1 = 0.75, step = 0.5;  // of a cell of 1/16: intervals end at faces
+  const auto pixel = [&](Mode mode, double direction, const auto& draw_scene) {
+    Scene s = small_scene(mode, orthographic({0.5, 0.47, 0.52}, {direction, 0, 0}, 0.1), Sampling::adaptive, 4);
+    s.region = {Vec3d(x0, 0, 0), Vec3d(x1, 1, 1)};
+    s.settings.step = step;
+    return *draw_scene(s).pixel(2, 2);
+  };
+  // a midpoint rule holds f = x exactly; the cells of nearest stand on either side of it alike
+  constexpr double integral = (x1 * x1 - x0 * x0) / 2;
+  const auto worst_of = [&](const EncodingCase& c, double rounding, const auto& draw_scene) {
+    // samples stand in the middle of their intervals; of nearest, the middle of the last cell is seen
+    const double greatest = interpolates(c.filter) ? x1 - step / 2 / 16 : x1 - 0.5 / 16;
+    std::vector<Check> all;
+    for (const double direction : {1.0, -1.0}) {
+      all.push_back(at_most(std::abs(pixel(Mode::projection, direction, draw_scene) - integral), rounding));
+      all.push_back(at_most(std::abs(pixel(Mode::mip, direction, draw_scene) - greatest), rounding));
+    }
+    return all_of(all);
+  };
+  v.for_each_filter("2 linear field, projection and mip, double", [&](const EncodingCase& c) {
+    const EncodedField field = v.build(h, c, {.storage = Storage::r64f});
+    return worst_of(c, 1e-12, [&](const Scene& s) { return render_on_cpu(h, field, s, true); });
+  });
+  v.for_each_filter("2 linear field, projection and mip, GL", [&](const EncodingCase& c) {
+    const EncodedField field = v.build(h, c);
+    return worst_of(c, 1e-5, [&](const Scene& s) { return draw(v.gl(), h, field, s); });
+  });
+}
+
 /// Four slabs of 2 to 6 cells along x, values 0 to 3.
 void slab_stack(VerifyContext& v) {
   const std::array<int, 5> faces{0, 2, 8, 11, 16};
@@ -316,6 +348,7 @@ void analytic_suite(VerifyContext& v) {
   constant_medium(v);
   anisotropic_medium(v);
   linear_medium(v);
+  linear_field(v);
   slab_stack(v);
   profiles(v);
   constants(v);
