@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <random>
 
 #include "structures/generators/random_mesh.hpp"
@@ -92,6 +93,47 @@ TEST(Leaves, EveryFinestCellHasOneLeafOrLiesInAHole) {
   EXPECT_TRUE(h.has_holes());
   EXPECT_FALSE(h.find_leaf({-1, 0, 0}));
   EXPECT_FALSE(h.find_leaf({0, 16, 0}));
+}
+
+/// A level of two clusters so many cells apart along x: side^3 patches of 2^3 cells with a gap of one between them.
+AmrHierarchy two_clusters(int apart, int side) {
+  MeshBuilder mesh({apart + 3 * side, 3 * side, 3 * side});
+  for (const int lower : {0, apart})
+    for_each_cell({Vec3i(0), Vec3i(side)}, [&](const Vec3i& i) {
+      const Vec3i at = i * 3 + Vec3i(lower, 0, 0);
+      mesh.patch(0, {at, at + Vec3i(2)}, std::vector<double>(8, i.x));
+    });
+  return mesh.hierarchy();
+}
+
+TEST(Leaves, AreFoundInClustersFarApart) {
+  constexpr int kSide = 9, kApart = 1 << 30;
+  const AmrHierarchy h = two_clusters(kApart, kSide);
+  EXPECT_EQ(h.leaf_cells(), 2 * 8 * kSide * kSide * kSide);
+  for (const int lower : {0, kApart})
+    for_each_cell({Vec3i(0), Vec3i(3 * kSide)}, [&](const Vec3i& i) {
+      const bool gap = i.x % 3 == 2 || i.y % 3 == 2 || i.z % 3 == 2;
+      const auto leaf = h.find_leaf(i + Vec3i(lower, 0, 0));
+      ASSERT_EQ(leaf.has_value(), !gap);
+      if (leaf) {
+        ASSERT_EQ(h.value(*leaf, 0), i.x / 3);
+      }
+    });
+  EXPECT_FALSE(h.find_leaf({kApart / 2, 1, 1}));
+  EXPECT_FALSE(h.find_leaf({kApart - 1, 0, 0}));
+  EXPECT_EQ(std::ssize(h.patches_in(0, h.domain(0))), 2 * kSide * kSide * kSide);
+  EXPECT_EQ(std::ssize(h.patches_in(0, {Vec3i(1), {kApart - 1, 3, 3 * kSide}})), kSide * kSide) << "a slice of the first";
+  EXPECT_EQ(h.patches_in(0, {{kApart + 3, 6, 3}, {kApart + 4, 7, 4}}).size(), 1u);
+}
+
+TEST(Leaves, OfClustersFarApartTakeNoLongerThanOfNeighbours) {
+  const auto seconds = [](int apart) {
+    const auto begin = std::chrono::steady_clock::now();
+    two_clusters(apart, 32);
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  };
+  const double near_by = std::max(seconds(96), seconds(96));
+  EXPECT_LT(seconds(1 << 30), 10 * near_by) << "one list a cluster would make it some hundred times as long";
 }
 
 TEST(Leaves, RefinedWithinAsksForFinerPatchesInABox) {

@@ -20,7 +20,8 @@ constexpr std::int64_t kMaxIndex = std::numeric_limits<std::int32_t>::max() - 40
 std::string text(const Vec3i& v) { return fmt::format("({}, {}, {})", v.x, v.y, v.z); }
 std::string text(const Box& b) { return fmt::format("[{}, {})", text(b.lower), text(b.upper)); }
 
-/// Patches of one level by bins over their common bounding box: constant-time look-up.
+/// Patches of one level by bins over their common bounding box: constant-time look-up. Where patches stand in clusters far apart,
+/// so many bins would be empty that only those with a patch are kept: a look-up is a binary search then.
 class PatchIndex {
  public:
   explicit PatchIndex(std::span<const Patch> patches) {
@@ -31,8 +32,14 @@ class PatchIndex {
       bounds_ = {glm::min(bounds_.lower, p.box.lower), glm::max(bounds_.upper, p.box.upper)};
       edges += std::cbrt(static_cast<double>(p.box.cells()));
     }
-    bin_ = static_cast<int>(std::clamp(edges / static_cast<double>(patches.size()), 1.0, static_cast<double>(kWidestBin)));
-    while (too_many_bins(patches)) bin_ *= 2;
+    widen_to(static_cast<int>(std::clamp(edges / static_cast<double>(patches.size()), 1.0, static_cast<double>(kWidestBin))));
+    while (too_many_entries(patches)) widen_to(2 * bin_);
+    const int narrow = bin_;
+    while (all_bins().cells() > kMostBins) widen_to(2 * bin_);
+    fill(patches);
+    if (bin_ == narrow || patches_a_look_up() <= kMostPatches) return;
+    widen_to(narrow);
+    keep_occupied(patches);
     fill(patches);
   }
 
@@ -40,49 +47,92 @@ class PatchIndex {
   void for_candidates(const Box& box, F&& f) const {
     const Box inside = intersection(box, bounds_);
     if (inside.empty()) return;
-    const Box bins = inside.shifted(-bounds_.lower).coarsened(bin_);
-    for_each_cell(bins, [&](const Vec3i& b) {
-      const std::size_t i = Box{Vec3i(0), bins_}.offset(b);
-      for (std::uint32_t k = first_[i]; k < first_[i + 1]; ++k) f(patch_[k]);
-    });
+    const Box bins = bins_of(inside);
+    if (!occupied_.empty() && bins.cells() > std::ssize(occupied_)) {
+      for (std::size_t i = 0; i < occupied_.size(); ++i)
+        if (bins.contains(bin_at(occupied_[i]))) for_list(i, f);
+    } else {
+      for_each_cell(bins, [&](const Vec3i& b) { for_list(list_of(b), f); });
+    }
   }
 
   int find(std::span<const Patch> patches, const Vec3i& cell) const {
     if (!bounds_.contains(cell)) return -1;
-    const std::size_t i = Box{Vec3i(0), bins_}.offset((cell - bounds_.lower) / bin_);
+    const std::size_t i = list_of((cell - bounds_.lower) / bin_);
     for (std::uint32_t k = first_[i]; k < first_[i + 1]; ++k)
       if (patches[static_cast<std::size_t>(patch_[k])].box.contains(cell)) return patch_[k];
     return -1;
   }
 
  private:
+  void widen_to(int cells) {
+    bin_ = cells;
+    bins_ = ceil_div(bounds_.size(), bin_);
+  }
+  Box all_bins() const { return {Vec3i(0), bins_}; }
   Box bins_of(const Box& box) const { return box.shifted(-bounds_.lower).coarsened(bin_); }
 
-  bool too_many_bins(std::span<const Patch> patches) {
-    bins_ = ceil_div(bounds_.size(), bin_);
-    if (Box{Vec3i(0), bins_}.cells() > (std::int64_t{1} << 22)) return true;
+  bool too_many_entries(std::span<const Patch> patches) const {
+    if (all_bins().cells() == CheckedSize::kMost) return true;
     CheckedSize entries;
     for (const Patch& p : patches) entries += bins_of(p.box).cells();
     return entries.or_most() > 16 * std::ssize(patches) + 4096;
   }
 
+  /// Which list is the bin's; the last one, which is empty, where only occupied bins are kept and this is none.
+  std::size_t list_of(const Vec3i& bin) const {
+    const std::uint64_t key = all_bins().offset(bin);
+    if (occupied_.empty()) return key;
+    const auto at = std::lower_bound(occupied_.begin(), occupied_.end(), key);
+    return at != occupied_.end() && *at == key ? static_cast<std::size_t>(at - occupied_.begin()) : occupied_.size();
+  }
+  Vec3i bin_at(std::uint64_t key) const {
+    const auto row = static_cast<std::uint64_t>(bins_.x);
+    const auto rows = static_cast<std::uint64_t>(bins_.y);
+    return {static_cast<int>(key % row), static_cast<int>(key / row % rows), static_cast<int>(key / row / rows)};
+  }
+  template <class F>
+  void for_list(std::size_t i, F&& f) const {
+    for (std::uint32_t k = first_[i]; k < first_[i + 1]; ++k) f(patch_[k]);
+  }
+
+  void keep_occupied(std::span<const Patch> patches) {
+    for (const Patch& p : patches)
+      for_each_cell(bins_of(p.box), [&](const Vec3i& b) { occupied_.push_back(all_bins().offset(b)); });
+    std::sort(occupied_.begin(), occupied_.end());
+    occupied_.erase(std::unique(occupied_.begin(), occupied_.end()), occupied_.end());
+  }
+
   void fill(std::span<const Patch> patches) {
-    const Box all{Vec3i(0), bins_};
-    first_.assign(static_cast<std::size_t>(all.cells()) + 1, 0);
-    for (const Patch& p : patches) for_each_cell(bins_of(p.box), [&](const Vec3i& b) { ++first_[all.offset(b) + 1]; });
+    const std::size_t lists = occupied_.empty() ? static_cast<std::size_t>(all_bins().cells()) : occupied_.size() + 1;
+    first_.assign(lists + 1, 0);
+    for (const Patch& p : patches) for_each_cell(bins_of(p.box), [&](const Vec3i& b) { ++first_[list_of(b) + 1]; });
     for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
     patch_.resize(first_.back());
     std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
     for (std::size_t k = 0; k < patches.size(); ++k)
-      for_each_cell(bins_of(patches[k].box), [&](const Vec3i& b) { patch_[next[all.offset(b)]++] = static_cast<int>(k); });
+      for_each_cell(bins_of(patches[k].box), [&](const Vec3i& b) { patch_[next[list_of(b)]++] = static_cast<int>(k); });
+  }
+
+  /// Patches that one look-up tests, seen from a patch.
+  double patches_a_look_up() const {
+    double sum = 0;
+    for (std::size_t i = 0; i + 1 < first_.size(); ++i) {
+      const double n = first_[i + 1] - first_[i];
+      sum += n * n;
+    }
+    return sum / static_cast<double>(patch_.size());
   }
 
   static constexpr int kWidestBin = 1 << 30;  // eight of them hold any mesh of 31 bits
+  static constexpr std::int64_t kMostBins = std::int64_t{1} << 22;
+  static constexpr double kMostPatches = 64;  // of a look-up, before empty bins are given up
 
   Box bounds_;
   Vec3i bins_{0};
   int bin_ = 1;
-  std::vector<std::uint32_t> first_;
+  std::vector<std::uint64_t> occupied_;  ///< bins with a patch, ascending; nothing where every bin has its list
+  std::vector<std::uint32_t> first_;     ///< of each list, and the end
   std::vector<int> patch_;
 };
 

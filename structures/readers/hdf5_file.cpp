@@ -1,22 +1,20 @@
 #include "structures/readers/hdf5_file.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <hdf5.h>
 #include <tbb/parallel_for.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cassert>
-#include <cerrno>
 #include <cstring>
 #include <mutex>
 #include <optional>
 #include <type_traits>
 
 #include "structures/mesh/quoted.hpp"
+#include "structures/readers/data_file.hpp"
 #include "structures/readers/hdf5_formats.hpp"
 #include "structures/readers/memory_check.hpp"
 #include "structures/readers/reader_tools.hpp"
@@ -143,20 +141,6 @@ std::string without_filling(const char* text, std::size_t most) {
   return last == std::string::npos ? "" : s.substr(0, last + 1);
 }
 
-/// Reads bytes of a file at any position, from any thread.
-void read_bytes(int descriptor, const fs::path& path, std::uint64_t offset, std::byte* out, std::size_t bytes) {
-  while (bytes > 0) {
-    const ssize_t got = ::pread(descriptor, out, bytes, static_cast<off_t>(offset));
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0)
-      throw Error(fmt::format("{}: {} bytes at {} cannot be read: {}", path.string(), bytes, offset,
-                              got < 0 ? reason_of({errno, std::generic_category()}) : "the file ends"));
-    out += got;
-    offset += static_cast<std::uint64_t>(got);
-    bytes -= static_cast<std::size_t>(got);
-  }
-}
-
 }  // namespace
 
 std::string text(const Hdf5Shape& shape) { return fmt::format("({})", fmt::join(shape, ", ")); }
@@ -164,16 +148,13 @@ std::string text(const Hdf5Shape& shape) { return fmt::format("({})", fmt::join(
 // ---- the file ----
 
 struct Hdf5File::State {
-  explicit State(const fs::path& p) : path(p), file_bytes(regular_file_size(p)) {}
-  ~State() {
-    if (descriptor >= 0) ::close(descriptor);
-  }
+  explicit State(const fs::path& p) : path(p), file_bytes(regular_file_size(p)), direct(p) {}
   State(const State&) = delete;
   State& operator=(const State&) = delete;
 
   fs::path path;
   std::uint64_t file_bytes;
-  int descriptor = -1;
+  DataFile direct;  ///< beside the library
   Handle file;
   Handle links;               ///< how links are followed: none into other files
   Handle data;                ///< the same for data sets, with the size of the cache
@@ -231,8 +212,6 @@ struct Hdf5File::State::Attribute {
 };
 
 void Hdf5File::State::open() {
-  descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) throw Error(fmt::format("{}: {}", path.string(), reason_of({errno, std::generic_category()})));
   const H5L_elink_traverse_t refuse = [](const char*, const char*, const char*, const char*, unsigned*, hid_t,
                                          void* met) -> herr_t {
     *static_cast<bool*>(met) = true;
@@ -610,8 +589,7 @@ void Hdf5Numbers::Data::read_directly(std::uint64_t first, std::span<T> out) con
   tbb::parallel_for(std::size_t{0}, pieces, [&](std::size_t piece) {
     const std::size_t from = piece * kPieceValues;
     const std::span<T> part = out.subspan(from, std::min(kPieceValues, out.size() - from));
-    read_bytes(file->descriptor, file->path, *place + (first + from) * sizeof(T), reinterpret_cast<std::byte*>(part.data()),
-               part.size_bytes());
+    file->direct.read(*place + (first + from) * sizeof(T), reinterpret_cast<std::byte*>(part.data()), part.size_bytes());
   });
 }
 
