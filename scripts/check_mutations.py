@@ -28,6 +28,9 @@ SUITES = ("analytic", "differential", "geometry", "metamorphic", "stiff", "conve
 TESTS = ("analytic_test", "conformance_test", "isosurface_test", "integrator_test", "shadow_test", "level_of_detail_test", "octree_test",
          "page_table_test", "kd_tree_test", "uniform_test", "exabricks_test", "leave_out_test")
 
+# seconds; a suite takes one minute, and some faults make a ray endless
+LONGEST = 600
+
 
 def tracked_files():
     listed = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True,
@@ -57,7 +60,7 @@ def ask(command):
     """What a suite or test says; None where it does not end."""
     environment = {**os.environ, "MESA_SHADER_CACHE_DIR": str(WORK / "shader_cache")}
     try:
-        return subprocess.run(command, cwd=COPY, capture_output=True, text=True, env=environment, timeout=1800, check=False)
+        return subprocess.run(command, cwd=COPY, capture_output=True, text=True, env=environment, timeout=LONGEST, check=False)
     except subprocess.TimeoutExpired:
         return None
 
